@@ -1,0 +1,1 @@
+"""Command lines that run without a ROS master, one module a command."""

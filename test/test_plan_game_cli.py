@@ -1,0 +1,102 @@
+"""The command `plan_game`, run as a person or a program would run it."""
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dr_eureka.cli.plan_game import main
+from dr_eureka.game.actions import actions_for
+from dr_eureka.game.planner import plan_pours
+from dr_eureka.game.state import START, State
+
+PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def run(*arguments):
+    """Run the executable in a fresh process without a ROS master."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("ROS_")}
+    environment["PYTHONPATH"] = str(PACKAGE / "src")
+    command = [sys.executable, str(PACKAGE / "scripts" / "plan_game"), *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30)
+
+
+def test_help_needs_no_master():
+    finished = run("--help")
+    assert finished.returncode == 0
+    assert "--start STATE" in finished.stdout
+
+
+def test_an_impossible_goal_ends_with_one_line_and_code_2():
+    finished = run("RRR|GG|PP")
+    assert finished.returncode == 2
+    assert finished.stdout == ""
+    assert finished.stderr == "plan_game: RRR|GG|PP: 3 red balls, expected 2\n"
+
+
+def test_an_impossible_start_ends_with_one_line_and_code_2(capsys):
+    assert main(["RR|GG|PP", "--start", "RR|GG"]) == 2
+    assert capsys.readouterr().err == "plan_game: RR|GG: 2 tubes, expected 3 separated by '|'\n"
+
+
+def test_the_json_plan_leads_from_start_to_goal():
+    finished = run("RRP|PG|G", "--json")
+    assert finished.returncode == 0
+    plan = json.loads(finished.stdout)
+    assert (plan["start"], plan["goal"], plan["strategy"], plan["cost"]) == ("RR|GG|PP", "RRP|PG|G", "fewest", 6)
+    tubes = {"left": "RR", "center": "GG", "right": "PP"}
+    for pour in plan["pours"]:
+        for _ in range(pour["count"]):
+            tubes[pour["target"]] += tubes[pour["source"]][-1]
+            tubes[pour["source"]] = tubes[pour["source"]][:-1]
+    assert tubes == {"left": "RRP", "center": "PG", "right": "G"}
+    assert plan["actions"][0] == {"kind": "pick", "hand": "left", "tube": "left"}
+    assert plan["actions"][2] == {
+        "kind": "pour", "hand": "right", "tube": "right", "target_tube": "left", "target_hand": "left", "count": 1,
+    }
+    assert len(plan["actions"]) == len(actions_for(plan_pours(START, State.parse("RRP|PG|G"))))
+
+
+def test_a_goal_that_is_the_start_is_a_plan_of_no_pours(capsys):
+    assert main(["GR|PP|RG", "--start", "GR|PP|RG", "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert (plan["cost"], plan["pours"], plan["actions"]) == (0, [], [])
+    assert main(["RR|GG|PP"]) == 0
+    assert "Nothing to do: the goal is the start." in capsys.readouterr().out
+
+
+def test_the_printed_plan_draws_the_tubes_after_each_pour(capsys):
+    assert main(["RR|G|PPG"]) == 0
+    assert capsys.readouterr().out == """\
+RR|GG|PP to RR|G|PPG: 1 pour, 4 picks and places
+
+  |   |    |   |    |   |
+  |   |    |   |    |   |
+  | R |    | G |    | P |
+  | R |    | G |    | P |
+  +---+    +---+    +---+
+   left    center   right
+
+  1. pick the center tube with the left hand
+  2. pick the right tube with the right hand
+  3. pour 1 ball from the center tube (left hand) into the right tube (right hand)
+
+  |   |    |   |    |   |
+  |   |    |   |    | G |
+  | R |    |   |    | P |
+  | R |    | G |    | P |
+  +---+    +---+    +---+
+   left    center   right    RR|G|PPG
+
+  4. place the center tube with the left hand
+  5. place the right tube with the right hand
+"""
+
+
+def test_a_missing_goal_is_refused(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([])
+    assert caught.value.code == 2
+    assert "GOAL" in capsys.readouterr().err
