@@ -1,0 +1,134 @@
+"""Training samples of the arm network: start joints, wanted hand step, and the joint step that makes it.
+
+The paper (section 3.4) draws joints and joint changes uniformly, and learns the drawn change. As the arm is redundant, many
+changes make the same hand step, and their mean makes none of them: an error floor of 0.36 cm that no network can pass. So here
+the drawn change only says which hand step is wanted, and the target is the smallest joint step that makes it. A share of the
+samples are steps straight through space, as the hybrid asks for them; random joint changes hardly ever make one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dr_eureka.kinematics.chain import Chain
+from dr_eureka.kinematics.transforms import rotation_vectors, rotations_from_vectors
+
+_NEWTON_STEPS = 6
+_NEWTON_DAMPING = 1e-6
+_CHUNK = 4096  # arrays of one chunk stay in the processor's cache
+
+
+@dataclass(frozen=True)
+class SampleSettings:
+    """Where samples are drawn; left arm, joint order of the chain, [rad] and [m].
+
+    lower, upper: the authors' ranges (which fall short of the tubes seen from a hand yawed by 30 degrees) clipped to the robot's
+    limits and widened by up to 25 degrees. change: of each joint, uniform. max_turn: of each part of the rotation vector. max_shift:
+    of the hand. straight_share: of the samples are straight steps, at most straight_shift and straight_turn. max_change: of a joint
+    in a target. target_error: how exactly a target must make its step.
+    """
+
+    lower: tuple[float, ...] = (-1.5708, 0.4363, -0.4403, -0.7854, 0.0514, -0.7854, -1.4137)
+    upper: tuple[float, ...] = (0.5236, 1.5708, 1.1345, 1.1868, 1.8641, 0.9655, 0.5236)
+    change: float = 0.5
+    max_turn: float = 0.5
+    max_shift: float = 0.5
+    straight_share: float = 0.5
+    straight_shift: float = 0.16
+    straight_turn: float = 0.4
+    max_change: float = 1.0
+    target_error: float = 1e-4
+
+
+@dataclass(frozen=True)
+class Samples:
+    """joints (n, 7) [rad], delta (n, 6) [m, rad], change (n, 7) [rad], target (n, 4, 4) pose of the end link in the root frame."""
+
+    joints: np.ndarray
+    delta: np.ndarray
+    change: np.ndarray
+    target: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+
+def draw_samples(chain: Chain, count: int, rng: np.random.Generator, settings: SampleSettings = SampleSettings()) -> Samples:
+    """Draw `count` samples, mixed: random joint changes (the paper's) and straight steps."""
+    straight = int(round(count * settings.straight_share))
+    parts = _collect(chain, count - straight, rng, settings, _draw_paper) + _collect(chain, straight, rng, settings, _draw_straight)
+    order = rng.permutation(count)
+    return Samples(*(np.concatenate(arrays)[order] for arrays in zip(*parts)))
+
+
+def least_norm_change(chain: Chain, joints: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smallest joint changes (n, k) [rad] that carry joints (n, k) to target poses (n, 4, 4), and their error (n,).
+
+    Newton's method on the constrained least-norm problem, dq <- J^+ (error + J dq) with J at q + dq: at rest there, dq lies in the
+    row space of J, which is the condition for the least norm. The error is the larger of metres and radians left over; where
+    the method did not settle it is large.
+    """
+    change = np.zeros_like(joints)
+    for _ in range(_NEWTON_STEPS):
+        poses, jacobians = chain.forward_and_jacobian(joints + change)
+        wanted = pose_errors(poses, targets) + np.einsum("nij,nj->ni", jacobians, change)
+        squares = jacobians @ jacobians.transpose(0, 2, 1) + _NEWTON_DAMPING * np.eye(6)
+        change = np.einsum("nij,ni->nj", jacobians, np.linalg.solve(squares, wanted[..., None])[..., 0])
+        change = np.clip(change, -1.5, 1.5)
+    errors = pose_errors(chain.forward(joints + change), targets)
+    return change, np.maximum(np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1))
+
+
+def pose_errors(poses: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return displacement [m] and rotation vector [rad] (n, 6), in the root frame, that carry poses (n, 4, 4) onto targets."""
+    turns = rotation_vectors(targets[:, :3, :3] @ poses[:, :3, :3].transpose(0, 2, 1))
+    return np.concatenate([targets[:, :3, 3] - poses[:, :3, 3], turns], axis=1)
+
+
+def moved(poses: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """Return poses (n, 4, 4) displaced and turned by delta (n, 6) [m, rad] in the root frame."""
+    result = poses.copy()
+    result[:, :3, :3] = rotations_from_vectors(delta[:, 3:]) @ poses[:, :3, :3]
+    result[:, :3, 3] += delta[:, :3]
+    return result
+
+
+def _collect(chain, count, rng, settings, draw) -> list[tuple[np.ndarray, ...]]:
+    """Gather chunks of `draw` until there are `count` samples with a settled target inside the limits."""
+    parts, missing = [], count
+    while missing > 0:
+        joints, delta, targets = draw(chain, rng, settings)
+        change, error = least_norm_change(chain, joints, targets)
+        end = joints + change
+        good = (error < settings.target_error) & (np.abs(change).max(axis=1) <= settings.max_change)
+        good &= np.all((end >= chain.lower) & (end <= chain.upper), axis=1)
+        kept = np.flatnonzero(good)[:missing]
+        parts.append((joints[kept], delta[kept], change[kept], targets[kept]))
+        missing -= len(kept)
+    return parts
+
+
+def _draw_paper(chain: Chain, rng: np.random.Generator, settings: SampleSettings) -> tuple[np.ndarray, ...]:
+    """Draw joints and changes uniformly, clip both to the range, keep the hand steps that are not too large."""
+    parts, kept = [], 0
+    while kept < _CHUNK:
+        joints = rng.uniform(settings.lower, settings.upper, (_CHUNK, len(chain)))
+        ends = np.clip(joints + rng.uniform(-settings.change, settings.change, joints.shape), settings.lower, settings.upper)
+        targets = chain.forward(ends)
+        delta = pose_errors(chain.forward(joints), targets)
+        near = (np.abs(delta[:, 3:]).max(axis=1) < settings.max_turn) & (np.linalg.norm(delta[:, :3], axis=1) <= settings.max_shift)
+        parts.append((joints[near], delta[near], targets[near]))
+        kept += int(near.sum())
+    return tuple(np.concatenate(arrays)[:_CHUNK] for arrays in zip(*parts))
+
+
+def _draw_straight(chain: Chain, rng: np.random.Generator, settings: SampleSettings) -> tuple[np.ndarray, ...]:
+    """Draw joints uniformly and steps in any direction, lengths and turns uniform from zero."""
+    joints = rng.uniform(settings.lower, settings.upper, (_CHUNK, len(chain)))
+    directions = rng.normal(size=(_CHUNK, 2, 3))
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    lengths = rng.uniform(0.0, [settings.straight_shift, settings.straight_turn], (_CHUNK, 2))
+    delta = (directions * lengths[:, :, None]).reshape(_CHUNK, 6)
+    return joints, delta, moved(chain.forward(joints), delta)

@@ -1,0 +1,1 @@
+"""A PyBullet world with robot, table, tubes, balls, card, camera and referee."""
