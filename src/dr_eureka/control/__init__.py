@@ -1,0 +1,1 @@
+"""Motions: trajectories, grasps, pours and the engine that runs them tick by tick."""

@@ -1,0 +1,91 @@
+"""One arm as the skills see it: where its hand is, and trajectories that bring it elsewhere."""
+
+from __future__ import annotations
+
+from typing import Mapping, Sequence
+
+import numpy as np
+
+from dr_eureka.control.codes import ControlError
+from dr_eureka.control.trajectory import MINIMUM_JERK_PEAK_SPEED, JointTrajectory, MotionLimits
+from dr_eureka.kinematics.arms import arm_chain, arm_joint_names, mirror
+from dr_eureka.kinematics.hybrid import HybridSettings, HybridSolver, IkCode, IkResult
+from dr_eureka.kinematics.network import ArmNetwork
+from dr_eureka.kinematics.transforms import rotation_about, rotation_vector, transform
+
+_TURN_SPACING = 0.15  # [rad] between solved poses where the hand turns
+
+
+class Arm:
+    """Plan joint trajectories for one hand; angles in rad, poses of the end link in `base` (4, 4)."""
+
+    def __init__(self, hand: str, settings: HybridSettings, network: ArmNetwork | None):
+        self.hand = hand
+        self.joints = arm_joint_names(hand)
+        self.chain = arm_chain(hand)
+        self._solver = HybridSolver(self.chain, network, settings)
+
+    def posture(self, left_posture: Sequence[float]) -> np.ndarray:
+        """Return a posture given for the left arm as this arm's joint angles (7,)."""
+        posture = np.asarray(left_posture, dtype=float)
+        return posture if self.hand == "left" else mirror(posture)
+
+    def positions(self, joints: Mapping[str, float]) -> np.ndarray:
+        """Pick this arm's joint angles (7,) out of all joints'."""
+        return np.array([joints[name] for name in self.joints])
+
+    def pose(self, joints: Mapping[str, float]) -> np.ndarray:
+        """Return base_from_end (4, 4) for measured joints."""
+        return self.chain.forward(self.positions(joints))
+
+    def solve(self, start: np.ndarray, base_from_end: np.ndarray, code: str, what: str, rest: np.ndarray | None = None) -> np.ndarray:
+        """Return joint angles (7,) for a hand pose; raise ControlError with `code`, naming `what` could not be reached."""
+        return self._checked(self._solver.solve(start, base_from_end, rest=rest), base_from_end, code, what)
+
+    def path(self, start: np.ndarray, poses: Sequence[np.ndarray], code: str, what: str, rest: np.ndarray | None = None) -> np.ndarray:
+        """Return joint angles (k, 7) through neighbouring hand poses, without jumps; raises as `solve`."""
+        results = self._solver.solve_path(start, poses, rest=rest)
+        return np.array([self._checked(result, pose, code, what) for result, pose in zip(results, poses)])
+
+    def _checked(self, result: IkResult, base_from_end: np.ndarray, code: str, what: str) -> np.ndarray:
+        if result.code != IkCode.CONVERGED:
+            place = np.round(base_from_end[:3, 3], 3).tolist()
+            raise ControlError(code, f"{self.hand} hand cannot reach {what}, end link at {place} m in base: {result.code}, {result.reason}")
+        return result.joints
+
+    def move(self, start: np.ndarray, end: np.ndarray, limits: MotionLimits) -> JointTrajectory:
+        """Return a straight joint-space trajectory."""
+        return JointTrajectory.within(np.array([start, end]), limits)
+
+    def glide(
+        self, start: np.ndarray, end: np.ndarray, spacing: float, limits: MotionLimits, code: str, what: str, rest: np.ndarray | None = None
+    ) -> JointTrajectory:
+        """Return a trajectory on which the hand moves straight and turns evenly to a pose (4, 4), at `limits`.
+
+        Poses are solved every `spacing` [m] of the way. At a constant height the hand passes over standing tubes, which a straight
+        line in joint space does not promise.
+        """
+        begin = self.chain.forward(start)
+        shift = end[:3, 3] - begin[:3, 3]
+        turn = rotation_vector(end[:3, :3] @ begin[:3, :3].T)
+        angle = float(np.linalg.norm(turn))
+        steps = max(2, int(np.ceil(np.linalg.norm(shift) / spacing)), int(np.ceil(angle / _TURN_SPACING)))
+        axis = turn / angle if angle > 1e-9 else np.array([0.0, 0.0, 1.0])
+        last = self.solve(start, end, code, what, rest)
+        points = [start]
+        for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
+            # Guessing near the straight line in joint space keeps the arm's spare freedom from wandering on the way.
+            guess = start + share * (last - start)
+            pose = transform(rotation_about(axis, share * angle) @ begin[:3, :3], begin[:3, 3] + share * shift)
+            points.append(self._checked(self._solver.solve(guess, pose, rest=guess, restarts=0), pose, code, what))
+        return JointTrajectory.within(np.array(points), limits)
+
+    def line(
+        self, start: np.ndarray, translation: np.ndarray, spacing: float, hand_speed: float, limits: MotionLimits, code: str, what: str
+    ) -> JointTrajectory:
+        """Return a trajectory that moves the hand straight by a translation (3,) [m], orientation kept, at most at `hand_speed` [m/s]."""
+        end = self.chain.forward(start)
+        end[:3, 3] += translation
+        trajectory = self.glide(start, end, spacing, limits, code, what, rest=start)
+        slowest = MINIMUM_JERK_PEAK_SPEED * float(np.linalg.norm(translation)) / hand_speed
+        return trajectory if trajectory.duration >= slowest else JointTrajectory(trajectory.points, slowest)

@@ -1,0 +1,73 @@
+"""What the engine knows of its own body and of the tubes while it works."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Mapping
+
+import numpy as np
+
+from dr_eureka.control.arm import Arm
+from dr_eureka.control.codes import ControlError, EngineCode
+from dr_eureka.control.port import HANDS, grip_joint
+from dr_eureka.control.settings import ControlSettings
+from dr_eureka.kinematics.network import ArmNetwork
+from dr_eureka.pieces import Pieces
+
+
+@dataclass(frozen=True)
+class Held:
+    """A tube in a hand: which one, and how it sits, end_from_tube (4, 4)."""
+
+    tube: str
+    end_from_tube: np.ndarray
+
+
+@dataclass
+class Body:
+    """Both arms, the tubes standing and held, and the joints as measured and as commanded last."""
+
+    settings: ControlSettings
+    pieces: Pieces
+    arms: dict[str, Arm]
+    places: dict[str, np.ndarray] = field(default_factory=dict)
+    held: dict[str, Held] = field(default_factory=dict)
+    joints: Mapping[str, float] = field(default_factory=dict)
+    goals: dict[str, float] = field(default_factory=dict)
+    pour_ready: tuple[str, str] | None = None
+    """(source hand, method) while both tubes are at that pour's ready pose."""
+    upright: dict[str, np.ndarray] = field(default_factory=dict)
+    """Joint angles (7,) by hand from which the tubes were brought to the ready pose: the way back."""
+
+    @classmethod
+    def build(cls, settings: ControlSettings, pieces: Pieces, network: ArmNetwork | None) -> Body:
+        """Make the body with its two arms."""
+        return cls(settings, pieces, {hand: Arm(hand, settings.kinematics, network) for hand in HANDS})
+
+    def commanded(self, hand: str) -> np.ndarray:
+        """Return the arm's joint angles (7,) as last commanded: where the next trajectory must start."""
+        return self.arms[hand].positions(self.goals)
+
+    def place_of(self, tube: str) -> np.ndarray:
+        """Return where a tube stands, foot (3,) [m] in base; raise ControlError if it is not known to stand anywhere."""
+        if tube not in self.places:
+            raise ControlError(EngineCode.INVALID_ACTION, f"tube {tube!r} is not known to stand on the sheet; standing: {sorted(self.places)}")
+        return self.places[tube]
+
+    def held_in(self, hand: str, tube: str) -> Held:
+        """Return the tube held in a hand; raise ControlError if that hand holds another or none."""
+        held = self.held.get(hand)
+        if held is None or held.tube != tube:
+            raise ControlError(
+                EngineCode.INVALID_ACTION, f"{hand} hand should hold tube {tube!r} but holds {held.tube if held else 'nothing'}"
+            )
+        return held
+
+    def check_grip(self, hand: str, code: str, moment: str) -> None:
+        """Raise ControlError with `code` unless the finger angle says that a tube is between the fingers."""
+        low, high = self.settings.grip.on_tube
+        angle = self.joints[grip_joint(hand)]
+        if not low <= angle <= high:
+            raise ControlError(
+                code, f"{hand} hand {moment}: fingers at {angle:.3f} rad, expected {low:.3f} to {high:.3f} with a tube between them"
+            )

@@ -1,0 +1,46 @@
+"""Names of the engine's states and of everything that can end a strategy."""
+
+from __future__ import annotations
+
+from dr_eureka.errors import DrEurekaError
+
+
+class EngineState:
+    """What the engine is doing."""
+
+    IDLE = "IDLE"
+    BUSY = "BUSY"
+    DONE = "DONE"
+    FAULT = "FAULT"
+
+
+class EngineCode:
+    """Why the engine is where it is; every fault has a name."""
+
+    OK = "OK"
+    BUSY = "BUSY"
+    STOPPED = "STOPPED"
+    UNKNOWN_JOINT = "UNKNOWN_JOINT"
+    INVALID_VALUE = "INVALID_VALUE"
+    INVALID_ACTION = "INVALID_ACTION"
+    OUT_OF_LIMITS = "OUT_OF_LIMITS"
+    UNREACHABLE_TUBE = "UNREACHABLE_TUBE"
+    UNREACHABLE_POUR = "UNREACHABLE_POUR"
+    GRASP_EMPTY = "GRASP_EMPTY"
+    TUBE_SLIPPED = "TUBE_SLIPPED"
+    TRACKING_ERROR = "TRACKING_ERROR"
+    JOINT_STATES_LOST = "JOINT_STATES_LOST"
+
+    ALL = (
+        OK, BUSY, STOPPED, UNKNOWN_JOINT, INVALID_VALUE, INVALID_ACTION, OUT_OF_LIMITS, UNREACHABLE_TUBE,
+        UNREACHABLE_POUR, GRASP_EMPTY, TUBE_SLIPPED, TRACKING_ERROR, JOINT_STATES_LOST,
+    )
+
+
+class ControlError(DrEurekaError):
+    """A motion that cannot be planned or must not go on; `code` is one of `EngineCode.ALL`."""
+
+    def __init__(self, code: str, message: str):
+        super().__init__(f"{code}: {message}")
+        self.code = code
+        self.message = message

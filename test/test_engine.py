@@ -1,0 +1,175 @@
+"""The control engine against an ideal robot: joints that are where they were told, fingers that stop on a tube."""
+
+import math
+
+import numpy as np
+import pytest
+
+from dr_eureka.control.codes import ControlError, EngineCode, EngineState
+from dr_eureka.control.engine import ControlEngine
+from dr_eureka.control.port import CONTROLLED_JOINTS
+from dr_eureka.control.settings import ControlSettings
+from dr_eureka.game.actions import Action, actions_for
+from dr_eureka.game.state import Pour
+from dr_eureka.pieces import load_pieces
+from dr_eureka.resources import load_yaml
+
+WHERE = "config/control_engine.yaml"
+PLACES = {"left": (0.44, 0.11, 0.775), "center": (0.44, 0.0, 0.775), "right": (0.44, -0.11, 0.775)}
+BALLS = {"left": 2, "center": 2, "right": 2}
+CYCLE = 0.008
+ON_TUBE = 0.959
+
+
+def make_engine() -> ControlEngine:
+    return ControlEngine(ControlSettings.from_mapping(load_yaml(WHERE), WHERE), load_pieces())
+
+
+class IdealRobot:
+    """Joints follow at once; fingers stop at `finger_stop` rad."""
+
+    def __init__(self, engine: ControlEngine, finger_stop: float = ON_TUBE):
+        self.engine, self.finger_stop, self.time = engine, finger_stop, 0.0
+        self.joints = dict.fromkeys(CONTROLLED_JOINTS, 0.0)
+        self.history = [dict(self.joints)]
+        self.cycle()
+
+    def cycle(self) -> None:
+        seen = {name: min(q, self.finger_stop) if name.endswith("grip") else q for name, q in self.joints.items()}
+        self.joints = self.engine.tick(self.time, seen)
+        self.history.append(dict(self.joints))
+        self.time += CYCLE
+
+    def run(self, seconds: float = 120.0) -> str:
+        end = self.time + seconds
+        while self.time < end and self.engine.status.state == EngineState.BUSY:
+            self.cycle()
+        return self.engine.status.state
+
+
+@pytest.mark.parametrize("method", ["lock", "direct"])
+@pytest.mark.parametrize("source, target", [("left", "right"), ("center", "left"), ("right", "center")])
+def test_a_pour_between_any_two_tubes_runs_to_its_end_and_puts_both_back(method, source, target):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start(actions_for([Pour(source, target, 1)]), PLACES, BALLS, method)
+    assert robot.run() == EngineState.DONE, engine.status
+    assert not engine.body.held
+    for tube, foot in PLACES.items():
+        assert engine.body.places[tube] == pytest.approx(foot, abs=1e-3)
+
+
+def test_commands_keep_range_speed_and_are_finite_during_a_whole_pour():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS)
+    robot.run()
+    names = sorted(engine.ranges)
+    commands = np.array([[row[name] for name in names] for row in robot.history])
+    assert np.isfinite(commands).all()
+    low, high = np.array([engine.ranges[name] for name in names]).T
+    assert (commands[2:] >= low - 1e-9).all() and (commands[2:] <= high + 1e-9).all()
+    assert np.abs(np.diff(commands, axis=0)).max() <= 3.4 * CYCLE + 1e-9
+
+
+def test_two_pours_of_the_same_kind_follow_without_raising_the_tubes():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start(actions_for([Pour("left", "right", 1), Pour("left", "right", 1)]), PLACES, BALLS)
+    robot.run()
+    pours = [end - start for index, start, end in engine.durations if index in (2, 3)]
+    assert engine.status.state == EngineState.DONE
+    assert pours[1] < pours[0] - 0.5
+
+
+def test_fingers_that_close_on_nothing_end_the_strategy_and_the_robot_holds():
+    engine = make_engine()
+    robot = IdealRobot(engine, finger_stop=9.9)
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.GRASP_EMPTY
+    held = dict(robot.joints)
+    for _ in range(50):
+        robot.cycle()
+    assert robot.joints == held
+
+
+@pytest.mark.parametrize("foot", [(0.9, 0.1, 0.775), (0.44, -0.5, 0.775)])
+def test_a_tube_out_of_reach_is_named(foot):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start([Action("pick", "left", "left")], {"left": foot}, BALLS)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.UNREACHABLE_TUBE
+    assert "'left'" in engine.status.message
+
+
+def test_a_place_that_is_not_finite_is_refused():
+    with pytest.raises(ControlError) as caught:
+        make_engine().start([Action("pick", "left", "left")], {"left": (math.nan, 0.0, 0.7)}, BALLS)
+    assert caught.value.code == EngineCode.INVALID_VALUE
+
+
+def test_a_second_strategy_is_refused_while_busy():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+    robot.cycle()
+    with pytest.raises(ControlError) as caught:
+        engine.start([], PLACES, BALLS)
+    assert caught.value.code == EngineCode.BUSY
+
+
+def test_stop_holds_within_one_cycle():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+    for _ in range(60):
+        robot.cycle()
+    engine.stop()
+    before = dict(robot.joints)
+    robot.cycle()
+    assert robot.joints == before
+    assert engine.status.code == EngineCode.STOPPED
+
+
+@pytest.mark.parametrize("spoil", [lambda j: j.pop("l_arm_el_y"), lambda j: j.update(l_arm_el_y=math.nan)])
+def test_a_joint_state_that_lacks_a_joint_ends_in_a_fault_that_names_it(spoil):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    joints = dict(robot.joints)
+    spoil(joints)
+    goals = engine.tick(1.0, joints)
+    assert engine.status.code == EngineCode.INVALID_VALUE and "l_arm_el_y" in engine.status.message
+    assert all(math.isfinite(goal) for goal in goals.values())
+
+
+def test_a_joint_that_does_not_follow_is_a_tracking_error():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+    stuck = 0.0
+    while engine.status.state == EngineState.BUSY and robot.time < 30.0:
+        robot.joints = engine.tick(robot.time, robot.joints | {"l_arm_sh_r": stuck})
+        robot.time += CYCLE
+    assert engine.status.code == EngineCode.TRACKING_ERROR and "l_arm_sh_r" in engine.status.message
+
+
+@pytest.mark.parametrize(
+    "name, goal, code",
+    [("l_arm_thumb", 0.1, EngineCode.UNKNOWN_JOINT), ("head_p", math.nan, EngineCode.INVALID_VALUE), ("head_p", 3.0, EngineCode.OUT_OF_LIMITS)],
+)
+def test_a_joint_goal_without_sense_is_refused_by_code(name, goal, code):
+    engine = make_engine()
+    IdealRobot(engine)
+    with pytest.raises(ControlError) as caught:
+        engine.move_joints({name: goal}, 1.0)
+    assert caught.value.code == code
+
+
+def test_the_head_goes_where_it_is_told():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.move_joints({"head_p": 0.87, "head_y": 0.1}, 1.0)
+    assert robot.run() == EngineState.DONE
+    assert robot.joints["head_p"] == pytest.approx(0.87) and robot.joints["head_y"] == pytest.approx(0.1)

@@ -1,0 +1,62 @@
+"""Engine and simulated world in one process: tubes are gripped by friction, one ball goes over, all else stays."""
+
+import numpy as np
+import pytest
+
+from dr_eureka.bench.rehearsal import play_actions
+from dr_eureka.control.codes import EngineCode, EngineState
+from dr_eureka.control.engine import ControlEngine
+from dr_eureka.control.settings import ControlSettings
+from dr_eureka.game.actions import actions_for
+from dr_eureka.game.state import TUBES, Pour, State
+from dr_eureka.pieces import load_pieces
+from dr_eureka.resources import load_yaml
+from dr_eureka.simulation.settings import load_world_settings
+from dr_eureka.simulation.world import World
+
+WHERE = "config/control_engine.yaml"
+
+
+def make_engine() -> ControlEngine:
+    return ControlEngine(ControlSettings.from_mapping(load_yaml(WHERE), WHERE), load_pieces())
+
+
+@pytest.mark.parametrize(
+    "start, pour, method",
+    [("RRGG|P|P", Pour("left", "center", 1), "lock"), ("RG|GPP|R", Pour("center", "right", 1), "direct")],
+)
+def test_exactly_one_ball_goes_from_one_tube_into_the_other(start, pour, method):
+    state, engine = State.parse(start), make_engine()
+    world = World(load_world_settings(), seed=5, start=state)
+    # Tubes as a camera would locate them: 2 mm off.
+    places = {tube: world.tube_pose(tube)[:3, 3] + np.array([0.0014, -0.0014, 0.0]) for tube in TUBES}
+    tilt = []
+
+    def watch(_: float) -> None:
+        for hand, held in engine.body.held.items():
+            true = world.tube_pose(held.tube)
+            known = engine.body.arms[hand].pose(world.joint_positions()) @ held.end_from_tube
+            tilt.append(np.degrees(np.arccos(np.clip(true[:3, 2] @ known[:3, 2], -1.0, 1.0))))
+
+    status = play_actions(world, engine, actions_for([pour]), places, {t: len(state.tube(t)) for t in TUBES}, method, each_cycle=watch)
+    verdict = world.referee()
+    world.close()
+    assert status.state == EngineState.DONE, status
+    assert verdict.state == str(state.after(pour))
+    assert verdict.balls_lost == 0
+    assert all(verdict.tubes_standing.values())
+    # A friction grasp gives a little when a tube is tilted fast; the pours bear twice this.
+    assert max(tilt) < 2.0
+
+
+def test_a_hand_that_closes_beside_the_tube_says_so_and_lifts_nothing():
+    engine = make_engine()
+    world = World(load_world_settings(), seed=5)
+    foot = world.tube_pose("left")[:3, 3]
+    status = play_actions(
+        world, engine, actions_for([Pour("left", "right", 1)]), {"left": foot + [-0.05, 0.06, 0.0], "right": foot}, {"left": 2}, "lock"
+    )
+    standing = world.referee().tubes_standing
+    world.close()
+    assert status.code == EngineCode.GRASP_EMPTY
+    assert standing["left"]
