@@ -1,0 +1,188 @@
+"""Where cards may be in a picture, and their rectified crops (paper section 3.1, Figure 6).
+
+The paper's way, grey, threshold, contours, four corners, rectify, with three differences. The grey is each pixel's
+smallest channel, in which balls and bench are as dark as the chalkboard and only what is white is bright. Several
+thresholds are tried, so that no exposure is assumed. And the quadrilateral is the black ground inside the white border,
+whose contrast the card brings along, whatever it lies on. Sizes are compared with the picture and with the quadrilateral
+itself, never with pixels at an assumed camera height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+CROP_PX = 416
+NOMINAL_BORDER = 0.065  # white border as a share of the card's side
+_SAMPLES_A_SIDE = 16
+_COARSE_PX = 64
+_PLAIN_CHROMA = 0.15  # largest less smallest channel, of the border's white; purple, the palest ball, has 0.32
+
+
+@dataclass(frozen=True)
+class FinderSettings:
+    """What a quadrilateral must be like to be looked at as a card."""
+
+    threshold_steps: int = field(metadata={"min": 2, "max": 30})  # levels between black and the picture's white
+    smallest_side: float = field(metadata={"min": 0.02, "max": 1.0})  # of the picture's height
+    longest_aspect: float = field(metadata={"min": 1.0, "max": 3.0})  # longest side over shortest
+    least_fill: float = field(metadata={"min": 0.5, "max": 1.0})  # hull's area over the quadrilateral's
+    least_contrast: float = field(metadata={"min": 0.0, "max": 1.0})  # border over ground, of the picture's white
+    least_coloured: float = field(metadata={"min": 0.0, "max": 1.0})  # share of a card that balls and bench colour
+    most_candidates: int = field(metadata={"min": 1, "max": 50})
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A dark quadrilateral in a white border: corners (4, 2) of the ground, clockwise, in pixels; side; quality 0..1."""
+
+    ground: np.ndarray
+    side_px: float
+    quality: float
+
+    @property
+    def centre(self) -> np.ndarray:
+        return self.ground.mean(0)
+
+
+def find_candidates(image_rgb: np.ndarray, settings: FinderSettings) -> list[Candidate]:
+    """Return quadrilaterals that may be cards in an RGB image (h, w, 3) uint8, best first; the same card may repeat."""
+    red, green, blue = cv2.split(image_rgb)
+    smooth = cv2.GaussianBlur(cv2.min(cv2.min(red, green), blue), (3, 3), 0)
+    white = max(float(np.percentile(smooth[::4, ::4], 99.5)), 16.0)
+    smallest = settings.smallest_side * image_rgb.shape[0]
+    found = []
+    for level in np.linspace(0.0, white, settings.threshold_steps + 2)[1:-1]:
+        _, dark = cv2.threshold(smooth, level, 255, cv2.THRESH_BINARY_INV)
+        contours, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+        for contour in contours:
+            if len(contour) < 3 * smallest:
+                continue
+            rough = _four_corners(contour, smallest, settings)
+            # Most outlines have no border round a dark ground: they are dropped before the costlier refinement.
+            if rough is None or np.subtract(*_border_and_inside(smooth, rough)).min() <= 0:
+                continue
+            ground = _refine(contour[:, 0, :].astype(np.float32), rough)
+            if ground is None or not _filled(contour, ground, settings):
+                continue
+            border, inside = _border_and_inside(smooth, ground)
+            contrast = float((border - inside).min()) / white
+            if contrast >= settings.least_contrast:
+                side = float(np.sqrt(cv2.contourArea(ground)))
+                # An edge that is blurred lies where its threshold is halfway: other levels see a card too small or large.
+                bias = abs(level - (border + inside).mean() / 2) / (border - inside).mean()
+                found.append(Candidate(ground, side, min(contrast, 1.0) * max(1.0 - bias, 0.1)))
+    found.sort(key=lambda candidate: -candidate.quality)
+    return found
+
+
+def group(candidates: list[Candidate], most: int) -> list[list[Candidate]]:
+    """Gather candidates of one place and size, best first in each group; the `most` largest groups in quality."""
+    groups: list[list[Candidate]] = []
+    for candidate in candidates:
+        for members in groups:
+            first = members[0]
+            near = np.linalg.norm(candidate.centre - first.centre) < 0.15 * first.side_px
+            if near and 0.8 < candidate.side_px / first.side_px < 1.25:
+                members.append(candidate)
+                break
+        else:
+            groups.append([candidate])
+    return groups[:most]
+
+
+def rectify(image: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cut a card out by its ground's corners (4, 2), clockwise from the one that becomes the upper left.
+
+    Returns the crop (416, 416, 3), in which a card of nominal border fills the frame, and the homography from picture
+    to crop pixels.
+    """
+    near, far = NOMINAL_BORDER * CROP_PX - 0.5, (1 - NOMINAL_BORDER) * CROP_PX - 0.5
+    target = np.array([(near, near), (far, near), (far, far), (near, far)], np.float32)
+    homography = cv2.getPerspectiveTransform(ground.astype(np.float32), target)
+    crop = cv2.warpPerspective(image, homography, (CROP_PX, CROP_PX), borderMode=cv2.BORDER_REPLICATE)
+    return crop, homography
+
+
+def coloured_share(crop: np.ndarray) -> float:
+    """Return which share of a crop is plainly coloured, its border taken for white: balls are, markers are not."""
+    small = cv2.resize(crop, (_COARSE_PX, _COARSE_PX), interpolation=cv2.INTER_AREA).astype(np.float32)
+    edge = np.concatenate((small[2], small[-3], small[:, 2], small[:, -3]))
+    margin = int(1.5 * NOMINAL_BORDER * _COARSE_PX)  # what surrounds the dark ground may have any colour
+    relative = small[margin:-margin, margin:-margin] / np.maximum(np.median(edge, axis=0), 1.0)
+    return float(((relative.max(-1) - relative.min(-1)) > _PLAIN_CHROMA).mean())
+
+
+def _four_corners(contour: np.ndarray, smallest: float, settings: FinderSettings) -> np.ndarray | None:
+    """Return the rough corners (4, 2) float32, clockwise in the picture, of a contour that is nearly a quadrilateral."""
+    hull = cv2.convexHull(contour)
+    if cv2.contourArea(hull) < smallest**2:
+        return None
+    perimeter = cv2.arcLength(hull, True)
+    for tolerance in (0.03, 0.045, 0.06, 0.08):
+        polygon = cv2.approxPolyDP(hull, tolerance * perimeter, True)[:, 0, :].astype(np.float32)
+        if len(polygon) <= 4:
+            break
+    if len(polygon) != 4:
+        return None
+    sides = np.linalg.norm(polygon - np.roll(polygon, 1, 0), axis=1)
+    if sides.min() < smallest or sides.max() > settings.longest_aspect * sides.min():
+        return None
+    # A positive area runs clockwise when y points down.
+    return polygon if cv2.contourArea(polygon, oriented=True) > 0 else np.ascontiguousarray(polygon[::-1])
+
+
+def _filled(contour: np.ndarray, ground: np.ndarray, settings: FinderSettings) -> bool:
+    """Tell whether a contour's hull and a quadrilateral are nearly the same."""
+    if not cv2.isContourConvex(ground):
+        return False
+    fill = cv2.contourArea(cv2.convexHull(contour)) / max(cv2.contourArea(ground), 1.0)
+    return settings.least_fill <= fill <= 2.0 - settings.least_fill
+
+
+def _refine(contour: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
+    """Move a polygon's corners to where lines through the middles of its sides meet: the card's corners are round."""
+    lines = []
+    middle = polygon.mean(0)
+    for start, end in zip(polygon, np.roll(polygon, -1, 0)):
+        length = np.linalg.norm(end - start)
+        if length < 4:
+            return None
+        along = (end - start) / length
+        normal = np.array((-along[1], along[0]))
+        offset = contour - start
+        share = offset @ along / length
+        near = contour[(share > 0.12) & (share < 0.88) & (np.abs(offset @ normal) < 0.05 * length + 1)]
+        if len(near) < 8:
+            return None
+        near = near[:: 1 + len(near) // 64]
+        vx, vy, x, y = cv2.fitLine(near, cv2.DIST_HUBER, 0, 0.01, 0.01).ravel()
+        point = np.array((x, y))
+        outward = np.array((-vy, vx))
+        outward *= np.sign(outward @ (point - middle)) or 1.0
+        lines.append((point + 0.5 * outward, np.array((vx, vy))))  # a contour runs through the edge pixels' centres
+    corners = []
+    for (p, u), (q, v) in zip(np.roll(np.array(lines), 1, 0), lines):
+        across = u[0] * v[1] - u[1] * v[0]
+        if abs(across) < 0.5:  # sides that meet at less than 30 degrees
+            return None
+        reach = ((q - p)[0] * v[1] - (q - p)[1] * v[0]) / across
+        corners.append(p + reach * u)
+    return np.array(corners, np.float32)
+
+
+def _border_and_inside(whiteness: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the level of the white border and that just inside the ground, for each of the four sides."""
+    middle = ground.mean(0)
+    shares = np.linspace(0.06, 0.94, _SAMPLES_A_SIDE)[:, None]
+
+    def around(scale: float) -> np.ndarray:
+        corners = middle + scale * (ground - middle)
+        points = [a + shares * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0))]
+        x, y = np.array(points, np.float32).transpose(2, 0, 1)
+        return cv2.remap(whiteness, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+
+    # A quarter of the border may be hidden; inside, three white feet may leave little of a side dark.
+    return np.percentile(around(1.07), 25, axis=1), np.percentile(around(0.93), 15, axis=1)
