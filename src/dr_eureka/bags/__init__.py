@@ -1,0 +1,1 @@
+"""Recordings read without a ROS master: which topics a bag has, its images and joint states, what the vision sees."""

@@ -1,0 +1,71 @@
+"""One look at something: the head turned there and at rest, images fed until they decide, every wait limited."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Optional
+
+from dr_eureka.behaviour.flow_settings import FlowSettings
+from dr_eureka.behaviour.observation import Frame, Gaze, Look, Observation
+from dr_eureka.behaviour.report import GameCode
+from dr_eureka.control.codes import EngineState
+
+
+@dataclass(frozen=True)
+class LookFailure:
+    """Why a look ended without a finding; `seen` tells that there were images, but they did not decide."""
+
+    code: str
+    message: str
+    seen: bool
+
+
+class GuidedLook:
+    """Feeds a `Look` with images taken after the head came to rest at `gaze`; without a gaze (a recording), with all."""
+
+    def __init__(self, look: Look, gaze: Optional[Gaze], limit_s: float, settings: FlowSettings, now: Observation):
+        self._look = look
+        self._gaze = gaze
+        self._limit_s = limit_s
+        self._settings = settings
+        self._waiting_since_s = self._frame_seen_s = now.wall_s
+        self._looking_since_s = now.robot_s if gaze is None else None
+
+    def step(self, now: Observation) -> Any:
+        """Return what the look found, a LookFailure when a limit is over, else None."""
+        if self._looking_since_s is None:
+            return self._wait_for_head(now)
+        if self._usable(now.frame):
+            self._frame_seen_s = now.wall_s
+            finding = self._look.add(now.frame)
+            if finding is not None:
+                return finding
+        if now.wall_s - self._frame_seen_s > self._settings.camera_limit:
+            return self._miss_the_camera(now)
+        if now.wall_s - self._waiting_since_s > self._limit_s:
+            code, reason = self._look.failure()
+            return LookFailure(code, f"{reason} within {self._limit_s:g} s", seen=True)
+        return None
+
+    def _wait_for_head(self, now: Observation) -> Optional[LookFailure]:
+        head, engine, limit_s = now.head, now.engine, self._settings.head_limit
+        off = max(abs(head.head_y - self._gaze.head_y), abs(head.head_p - self._gaze.head_p)) if head else float("inf")
+        if off <= self._settings.head_tolerance and engine.state != EngineState.BUSY:
+            self._looking_since_s = now.robot_s
+            self._waiting_since_s = self._frame_seen_s = now.wall_s
+        elif now.wall_s - self._waiting_since_s > limit_s:
+            state = f"control_engine {engine.state} {engine.code} {engine.message}"
+            message = f"head at {head} after {limit_s:g} s, expected {self._gaze} ({state})"
+            return LookFailure(GameCode.HEAD_NOT_STILL, message, seen=False)
+        return None
+
+    def _usable(self, frame: Optional[Frame]) -> bool:
+        return frame is not None and (self._gaze is None or frame.stamp_s >= self._looking_since_s)
+
+    def _miss_the_camera(self, now: Observation) -> LookFailure:
+        limit_s = self._settings.camera_limit
+        if self._gaze is None:
+            # A recording has simply come to its end: what matters is what was not found in it.
+            code, reason = self._look.failure()
+            return LookFailure(code, f"{reason}, and the recording gave no image for {limit_s:g} s", seen=True)
+        return LookFailure(GameCode.NO_CAMERA, f"{now.camera_problem or 'no image'} within {limit_s:g} s", seen=False)

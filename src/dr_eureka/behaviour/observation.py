@@ -1,0 +1,93 @@
+"""What the game flow sees and asks for: images, the engine's status, and the robot it commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Mapping, Optional, Protocol, Sequence
+
+import numpy as np
+
+from dr_eureka.game.actions import Action
+
+#: Code of an `Answer` that never came.
+NO_ANSWER = "NO_ANSWER"
+
+
+@dataclass(frozen=True)
+class Gaze:
+    """Where the head points [rad]: `head_y` positive to the left, `head_p` positive down."""
+
+    head_y: float
+    head_p: float
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """An image taken with the head at rest.
+
+    `image` is (height, width, 3) uint8 rgb, `camera` a `vision.camera.CameraModel`, `base_from_camera` (4, 4),
+    `stamp_s` the robot time of the image.
+    """
+
+    stamp_s: float
+    image: np.ndarray
+    camera: Any
+    base_from_camera: np.ndarray
+
+
+@dataclass(frozen=True)
+class EngineView:
+    """The control engine's last status, and the wall time at which it was heard."""
+
+    state: str
+    code: str
+    strategy_id: int
+    action_index: int
+    message: str
+    heard_wall_s: float
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Everything the flow knows at one step.
+
+    `frame` is a new image or None; `camera_seen` tells that images arrive at all, `camera_problem` why none is usable;
+    `head` holds the present `head_y` and `head_p` [rad], or is None before the first joint state.
+    """
+
+    wall_s: float
+    robot_s: float
+    engine: Optional[EngineView] = None
+    frame: Optional[Frame] = None
+    camera_seen: bool = False
+    camera_problem: str = ""
+    head: Optional[Gaze] = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The engine's answer to a request; `code` is one of `control.codes.EngineCode`, OK when accepted, or NO_ANSWER."""
+
+    code: str
+    message: str = ""
+    strategy_id: int = 0
+
+
+class Robot(Protocol):
+    """The control engine as the flow commands it; every call is bounded in time and answers."""
+
+    def look_at(self, gaze: Gaze, duration_s: float) -> Answer:
+        """Begin to turn the head."""
+
+    def execute(self, actions: Sequence[Action], tubes: Mapping[str, Any], balls: Mapping[str, int], pour: str) -> Answer:
+        """Begin a strategy; `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds."""
+
+
+class Look(Protocol):
+    """A decision that ripens over several images, such as which card is shown."""
+
+    def add(self, frame: Frame) -> Optional[Any]:
+        """Take one more image; return what was found once enough images agree, else None."""
+
+    def failure(self) -> tuple[str, str]:
+        """Return the game code and the reason when time runs out undecided."""

@@ -1,0 +1,1 @@
+"""The ROS side: parameters read once, messages converted, cores called."""

@@ -1,0 +1,219 @@
+"""ROS node that plays the game: reads the card, plans, locates the tubes, has the control engine carry the plan out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Sequence
+
+import rospy
+
+from dr_eureka import msg
+from dr_eureka.behaviour.flow_settings import FlowSettings
+from dr_eureka.behaviour.game_flow import GameFlow, Looks
+from dr_eureka.behaviour.looks import CardFinding, CardLook, ResultLook, TubeLook, TubesFinding
+from dr_eureka.behaviour.observation import Frame, Observation
+from dr_eureka.behaviour.report import GameCode, GameReport, Phase
+from dr_eureka.game.actions import Action
+from dr_eureka.game.state import Pour, State
+from dr_eureka.nodes import messages
+from dr_eureka.nodes.bag_check import check_bag
+from dr_eureka.nodes.engine_client import EngineClient
+from dr_eureka.nodes.folders import resolve
+from dr_eureka.nodes.parameters import private_parameters, take, take_choice, take_count, take_state, take_state_unless
+from dr_eureka.nodes.runner import run_node
+from dr_eureka.nodes.sight import TRANSPORTS, Sight, SightSettings
+from dr_eureka.pieces import load_pieces
+from dr_eureka.settings import build
+from dr_eureka.vision.cards import CardReader, CardSettings
+from dr_eureka.vision.contents import ContentsReading, ContentsSettings, read_contents
+from dr_eureka.vision.tubes import TubeScene, TubeSettings, locate_tubes
+from dr_eureka.vision.voting import CardVote, TubeVote, VoteSettings
+
+NAME = "dr_eureka_main"
+STRATEGIES = ("fewest",)
+POURS = ("lock", "direct")
+_SECONDS = {"min": 0.01, "max": 600.0}
+# Time for the last, latched messages to leave the process before it ends.
+_LINGER_S = 1.0
+
+
+@dataclass(frozen=True)
+class MainSettings:
+    """The `node:` block of config/dr_eureka_main.yaml, which explains it."""
+
+    period: float = field(metadata=_SECONDS)
+    status_period: float = field(metadata=_SECONDS)
+    service_limit: float = field(metadata=_SECONDS)
+    image_max_age: float = field(metadata=_SECONDS)
+    pose_limit: float = field(metadata=_SECONDS)
+    still_window: float = field(metadata=_SECONDS)
+    still_tolerance: float = field(metadata={"min": 0.0, "max": 0.1})
+    history: float = field(metadata=_SECONDS)
+    replay_history: float = field(metadata=_SECONDS)
+    replay_backlog: int = field(metadata={"min": 1, "max": 10000})
+
+
+class Announcer:
+    """Publishes what the game flow finds out, latched (`behaviour.game_flow.Listener`)."""
+
+    def __init__(self) -> None:
+        self._card = rospy.Publisher("~card", msg.CardDetection, queue_size=10, latch=True)
+        self._plan = rospy.Publisher("~plan", msg.Plan, queue_size=10, latch=True)
+        self._tubes = rospy.Publisher("~tubes", msg.TubeScene, queue_size=10, latch=True)
+        self._status = rospy.Publisher("~status", msg.GameStatus, queue_size=50, latch=True)
+        self._told: tuple[str, int] = ("", -1)
+
+    def on_card(self, finding: CardFinding) -> None:
+        """Publish the card that was read."""
+        self._card.publish(messages.card_to_message(finding))
+        rospy.loginfo("card: %s (%d images)", finding.state, finding.images)
+
+    def on_plan(self, start: State, goal: State, pours: Sequence[Pour], actions: Sequence[Action]) -> None:
+        """Publish the plan."""
+        plan = msg.Plan(start=str(start), goal=str(goal), strategy=STRATEGIES[0])
+        plan.pours = [messages.pour_to_message(pour) for pour in pours]
+        plan.actions = [messages.action_to_message(action) for action in actions]
+        plan.header.stamp = rospy.get_rostime()
+        self._plan.publish(plan)
+        rospy.loginfo("plan: %s to %s, %d pours, %d actions", start, goal, len(pours), len(actions))
+
+    def on_tubes(self, finding: TubesFinding) -> None:
+        """Publish where the tubes stand."""
+        self._tubes.publish(messages.scene_to_message(finding))
+        places = ", ".join(f"{name} ({place.position[0]:.4f}, {place.position[1]:.4f})" for name, place in finding.tubes.items())
+        rospy.loginfo("tubes: %s", places)
+
+    def on_report(self, report: GameReport) -> None:
+        """Publish where the game stands, and log a new phase."""
+        self._status.publish(messages.report_to_message(report, rospy.get_time()))
+        if (report.phase, report.game) == self._told:
+            return
+        self._told = report.phase, report.game
+        log = rospy.logerr if report.phase == Phase.FAILED else rospy.loginfo
+        ending = f": {report.code}" if report.code != GameCode.UNDECIDED else ""
+        log("game %d of %d: %s%s %s", report.game + 1, report.games, report.phase, ending, report.message)
+
+
+class DrEurekaMain:
+    """The Dr. Eureka Main node of the paper's Figure 5.
+
+    ROS Publishers (all latched):
+        * **~status** (dr_eureka/GameStatus): phase, code, what was done; on change and at 2 Hz
+        * **~card** (dr_eureka/CardDetection), **~plan** (dr_eureka/Plan), **~tubes** (dr_eureka/TubeScene)
+    ROS Subscribers:
+        * **camera/image_raw** (sensor_msgs/Image; rgb8, bgr8, mono8) or **camera/image_raw/compressed**, only while it
+          looks; **camera/camera_info** (sensor_msgs/CameraInfo)
+        * **robotis/present_joint_states** (sensor_msgs/JointState): where the head is
+        * **control_engine/status** (dr_eureka/EngineStatus)
+    ROS Services called:
+        * **control_engine/set_joints**, **control_engine/execute_strategy**
+    ROS Parameters:
+        * **~start** (str): state of the tubes at the beginning, as RR|GG|PP
+        * **~goal** (str): state to reach instead of a card, or `card`: read one
+        * **~games** (int): games to play, each from where the last one ended
+        * **~strategy** (str): fewest; **~pour** (str): lock or direct
+        * **~image_transport** (str): raw or compressed
+        * **~replay** (bool): command nothing, look at recorded images; **~bag** (str): the recording, checked first
+        * **~stay** (bool): go on publishing the result when all games are over
+        * node, flow, votes, cards, tubes, contents: see config/dr_eureka_main.yaml
+    """
+
+    def __init__(self, flow: GameFlow, sight: Sight, engine: EngineClient | None, announcer: Announcer, settings: MainSettings):
+        self._flow = flow
+        self._sight = sight
+        self._engine = engine
+        self._announcer = announcer
+        self._settings = settings
+
+    def play(self) -> int:
+        """Play until all games are over or the node is shut down; return the exit code."""
+        published_s = 0.0
+        while not rospy.is_shutdown() and not self._flow.over:
+            self._sight.open(self._flow.report().phase != Phase.PLAYING)
+            try:
+                self._flow.step(self._observe())
+            except Exception as error:  # the engine must be left holding and the scorekeeper told, whatever went wrong
+                rospy.logerr("%s: %s", type(error).__name__, error)
+                self._flow.fail(GameCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}")
+            if time.monotonic() - published_s > self._settings.status_period:
+                published_s = time.monotonic()
+                self._announcer.on_report(self._flow.report())
+            time.sleep(self._settings.period)
+        self._sight.open(False)
+        return 0 if self._flow.report().code in (GameCode.SOLVED, GameCode.REPLAYED) else 1
+
+    def _observe(self) -> Observation:
+        return Observation(
+            wall_s=time.monotonic(),
+            robot_s=rospy.get_time(),
+            engine=self._engine.view if self._engine else None,
+            frame=self._sight.take(),
+            camera_seen=self._sight.seen,
+            camera_problem=self._sight.problem,
+            head=self._sight.head,
+        )
+
+
+def _serve() -> int:
+    parameters = private_parameters()
+    where = f"{rospy.get_name()} parameters"
+    settings = build(MainSettings, take(parameters, "node"), f"{where} node")
+    flow_settings = build(FlowSettings, take(parameters, "flow"), f"{where} flow")
+    votes = build(VoteSettings, take(parameters, "votes"), f"{where} votes")
+    card_settings = build(CardSettings, take(parameters, "cards"), f"{where} cards")
+    contents_settings = build(ContentsSettings, take(parameters, "contents"), f"{where} contents")
+    tube_settings = build(TubeSettings, take(parameters, "tubes"), f"{where} tubes")
+    start = take_state(parameters, "start")
+    goal = take_state_unless(parameters, "goal", "card")
+    games = take_count(parameters, "games", least=1)
+    pour = take_choice(parameters, "pour", POURS)
+    transport = take_choice(parameters, "image_transport", TRANSPORTS)
+    take_choice(parameters, "strategy", STRATEGIES)
+    replay, stay = take_choice(parameters, "replay", (False, True)), take_choice(parameters, "stay", (False, True))
+    if replay:
+        check_bag(resolve(str(take(parameters, "bag"))), transport)
+
+    reader, pieces = CardReader.load(card_settings), load_pieces()
+
+    def locate(frame: Frame) -> TubeScene:
+        return locate_tubes(frame.image, frame.camera, frame.base_from_camera, pieces, tube_settings)
+
+    def read_balls(frame: Frame, scene: TubeScene) -> ContentsReading:
+        return read_contents(frame.image, frame.camera, frame.base_from_camera, scene.tubes, pieces, contents_settings)
+
+    announcer = Announcer()
+    engine = None if replay else EngineClient(settings.service_limit)
+    flow = GameFlow(
+        flow_settings,
+        start=start,
+        goal=goal,
+        games=games,
+        pour=pour,
+        looks=Looks(
+            card=lambda: CardLook(reader.read, CardVote(votes.card)),
+            tubes=lambda: TubeLook(locate, TubeVote(votes.tubes)),
+            result=lambda: ResultLook(locate, read_balls, TubeVote(votes.tubes), CardVote(votes.contents)),
+        ),
+        listener=announcer,
+        robot=engine,
+    )
+    sight_settings = SightSettings(
+        settings.image_max_age,
+        settings.pose_limit,
+        settings.still_window,
+        settings.still_tolerance,
+        backlog=settings.replay_backlog if replay else 1,
+        history=settings.replay_history if replay else settings.history,
+    )
+    code = DrEurekaMain(flow, Sight(sight_settings, transport), engine, announcer, settings).play()
+    if stay:
+        rospy.spin()
+    else:
+        time.sleep(_LINGER_S)
+    return code
+
+
+def main() -> int:
+    """Run the node and return its exit code."""
+    return run_node(NAME, DrEurekaMain.__doc__, _serve)

@@ -1,0 +1,67 @@
+"""The control engine seen from another node: requests that end in time, and its last status."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any, Mapping, Optional, Sequence
+
+import rospy
+
+from dr_eureka import msg, srv
+from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Gaze
+from dr_eureka.game.actions import Action
+from dr_eureka.nodes import messages
+
+
+class EngineClient:
+    """Commands `control_engine` by service (`behaviour.observation.Robot`) and listens to its status."""
+
+    def __init__(self, limit_s: float):
+        self._limit_s = limit_s
+        self._view: Optional[EngineView] = None
+        self._set_joints = rospy.ServiceProxy("control_engine/set_joints", srv.SetJoints)
+        self._execute_strategy = rospy.ServiceProxy("control_engine/execute_strategy", srv.ExecuteStrategy)
+        rospy.Subscriber("control_engine/status", msg.EngineStatus, self._on_status, queue_size=10)
+
+    @property
+    def view(self) -> Optional[EngineView]:
+        """The last status, None before the first."""
+        return self._view
+
+    def look_at(self, gaze: Gaze, duration_s: float) -> Answer:
+        """Begin to turn the head."""
+        request = srv.SetJointsRequest(["head_y", "head_p"], [gaze.head_y, gaze.head_p], duration_s)
+        return self._ask(self._set_joints, request)
+
+    def execute(self, actions: Sequence[Action], tubes: Mapping[str, Any], balls: Mapping[str, int], pour: str) -> Answer:
+        """Begin a strategy; `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds."""
+        request = srv.ExecuteStrategyRequest(
+            actions=[messages.action_to_message(action) for action in actions],
+            tubes=[messages.tube_to_message(name, place.position, place.sigma_m) for name, place in tubes.items()],
+            balls=bytes(balls[name] for name in tubes),
+            pour=pour,
+        )
+        return self._ask(self._execute_strategy, request)
+
+    def _on_status(self, status: msg.EngineStatus) -> None:
+        self._view = messages.engine_view(status, time.monotonic())
+
+    def _ask(self, service: rospy.ServiceProxy, request: Any) -> Answer:
+        """Call a service, but never wait longer than the limit: a stopped process would keep rospy waiting for ever."""
+        name = service.resolved_name
+        answers: list[Answer] = []
+
+        def call() -> None:
+            try:
+                rospy.wait_for_service(name, self._limit_s)
+                response = service(request)
+                strategy_id = getattr(response, "strategy_id", 0)
+                answers.append(Answer(messages.engine_code_name(response.result), response.message, strategy_id))
+            except (rospy.ROSException, rospy.ServiceException) as error:
+                answers.append(Answer(NO_ANSWER, f"{name}: {error}"))
+
+        caller = threading.Thread(target=call, daemon=True)
+        caller.start()
+        caller.join(self._limit_s)
+        return answers[0] if answers else Answer(NO_ANSWER, f"{name}: no answer within {self._limit_s:g} s")

@@ -1,0 +1,364 @@
+"""The course of a game, with fakes for the robot and for what is looked at."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from dr_eureka.behaviour.flow_settings import FlowSettings
+from dr_eureka.behaviour.game_flow import GameFlow, Looks
+from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Frame, Gaze, Observation
+from dr_eureka.behaviour.report import GameCode, Phase
+from dr_eureka.control.codes import EngineCode, EngineState
+from dr_eureka.game.state import START, State
+
+CARD_GAZE, SHEET_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87)
+SETTINGS = FlowSettings(
+    engine_limit=10.0,
+    engine_silence=3.0,
+    camera_limit=5.0,
+    head_limit=4.0,
+    card_limit=20.0,
+    tubes_limit=20.0,
+    check_limit=20.0,
+    most_replans=2,
+    head_duration=1.0,
+    head_tolerance=0.02,
+    card_gaze=CARD_GAZE,
+    sheet_gaze=SHEET_GAZE,
+)
+GOAL = State.parse("R|GG|PPR")
+PLACES = {"left": (0.44, 0.11, 0.775), "center": (0.44, 0.0, 0.775), "right": (0.44, -0.11, 0.775)}
+
+
+class FakeLook:
+    """Decides after three images, or never."""
+
+    def __init__(self, finding, code):
+        self.finding, self.code, self.images = finding, code, 0
+
+    def add(self, frame):
+        self.images += 1
+        return self.finding if self.images == 3 else None
+
+    def failure(self):
+        return self.code, f"{self.images} images"
+
+
+class World:
+    """A robot that obeys at once, a camera, clocks, and a record of what the flow tells."""
+
+    def __init__(self, goal=None, games=1, cards=("R|GG|PPR",), robot=True, settings=SETTINGS, results=()):
+        self.cards = list(cards)
+        self.results = list(results)
+        self.reports, self.plans, self.found_cards, self.found_tubes = [], [], [], []
+        self.gazes, self.strategies = [], []
+        self.answer = EngineCode.OK
+        self.now = Observation(
+            wall_s=100.0,
+            robot_s=7.0,
+            engine=EngineView(EngineState.IDLE, EngineCode.OK, 0, -1, "", 100.0),
+            camera_seen=True,
+            head=Gaze(0.0, 0.0),
+        )
+        self.frames = True
+        self.engine_speaks = True
+        self.flow = GameFlow(
+            settings, START, goal, games, "lock", Looks(self.card_look, self.tube_look, self.result_look), self,
+            self if robot else None,
+        )
+
+    def card_look(self):
+        state = self.cards.pop(0) if self.cards else None
+        return FakeLook(SimpleNamespace(state=State.parse(state)) if state else None, GameCode.NO_CARD)
+
+    def tube_look(self):
+        return FakeLook(SimpleNamespace(tubes=PLACES), GameCode.NO_TUBES)
+
+    def result_look(self):
+        state = self.results.pop(0) if self.results else self.flow.report().goal
+        return FakeLook(SimpleNamespace(tubes=PLACES, state=State.parse(state)) if state else None, GameCode.UNCHECKED)
+
+    def look_at(self, gaze, duration_s):
+        self.gazes.append(gaze)
+        if self.answer == EngineCode.OK:
+            self.now = replace(self.now, head=gaze)
+        return Answer(self.answer, "fake")
+
+    def execute(self, actions, tubes, balls, pour):
+        self.strategies.append((actions, tubes, balls, pour))
+        number = len(self.strategies)
+        self.engine(EngineState.BUSY, strategy_id=number)
+        return Answer(self.answer, "fake", number)
+
+    def engine(self, state, code=EngineCode.OK, strategy_id=1, action_index=-1, message=""):
+        self.now = replace(self.now, engine=EngineView(state, code, strategy_id, action_index, message, self.now.wall_s))
+
+    def on_card(self, finding):
+        self.found_cards.append(str(finding.state))
+
+    def on_plan(self, start, goal, pours, actions):
+        self.plans.append((str(start), str(goal), len(pours), actions))
+
+    def on_tubes(self, finding):
+        self.found_tubes.append(finding.tubes)
+
+    def on_report(self, report):
+        self.reports.append(report)
+
+    def step(self, seconds=0.1):
+        robot_s, wall_s = self.now.robot_s + seconds, self.now.wall_s + seconds
+        frame = Frame(robot_s, np.zeros((4, 4, 3), np.uint8), None, np.eye(4)) if self.frames else None
+        engine = self.now.engine
+        if engine and self.engine_speaks:
+            engine = replace(engine, heard_wall_s=wall_s)
+        self.now = replace(self.now, robot_s=robot_s, wall_s=wall_s, frame=frame, engine=engine)
+        self.flow.step(self.now)
+        return self.flow.report()
+
+    def until(self, phase, steps=400):
+        for _ in range(steps):
+            if self.step().phase == phase:
+                return self.flow.report()
+        raise AssertionError(f"never {phase}: {self.flow.report()}")
+
+    @property
+    def phases(self):
+        phases = [report.phase for report in self.reports]
+        return [phase for index, phase in enumerate(phases) if index == 0 or phases[index - 1] != phase]
+
+
+def test_a_game_goes_from_card_to_plan_to_tubes_to_the_last_action():
+    world = World()
+    world.until(Phase.PLAYING)
+    actions, tubes, balls, pour = world.strategies[0]
+    assert tubes == PLACES and pour == "lock"
+    assert balls == {"left": 2, "center": 2, "right": 2}
+    for index in range(len(actions)):
+        world.engine(EngineState.BUSY, action_index=index)
+        world.step()
+    world.engine(EngineState.DONE, action_index=len(actions) - 1)
+    report = world.until(Phase.FINISHED)
+    assert (report.phase, report.code, report.goal) == (Phase.FINISHED, GameCode.SOLVED, "R|GG|PPR")
+    assert [record.action for record in report.actions] == list(actions)
+    assert world.flow.over
+    assert world.gazes == [CARD_GAZE, SHEET_GAZE, SHEET_GAZE]
+    assert world.phases == [
+        Phase.WAITING_FOR_ENGINE, Phase.WAITING_FOR_CAMERA, Phase.LOOKING_FOR_CARD, Phase.PLANNING,
+        Phase.LOOKING_FOR_TUBES, Phase.PLAYING, Phase.CHECKING, Phase.FINISHED,
+    ]
+
+
+def test_actions_carry_the_times_between_which_the_engine_was_at_them():
+    world = World(goal=GOAL)
+    world.until(Phase.PLAYING)
+    began_s = world.reports[0].robot_seconds
+    for index, steps in ((0, 5), (1, 10), (3, 1)):
+        world.engine(EngineState.BUSY, action_index=index)
+        for _ in range(steps):
+            report = world.step()
+    first, second, third, fourth = report.actions
+    assert began_s < first.start_s < first.end_s == second.start_s
+    assert second.end_s - second.start_s == pytest.approx(1.0)
+    assert third.start_s == third.end_s == fourth.start_s
+
+
+def test_a_given_goal_is_played_without_looking_for_a_card():
+    world = World(goal=GOAL)
+    world.until(Phase.PLAYING)
+    assert world.gazes == [SHEET_GAZE]
+    assert Phase.LOOKING_FOR_CARD not in world.phases
+
+
+def test_a_goal_equal_to_the_start_is_solved_without_a_motion():
+    world = World(goal=START)
+    report = world.until(Phase.FINISHED)
+    assert (report.code, report.actions, world.strategies) == (GameCode.SOLVED, (), [])
+
+
+def finish(world):
+    """Let the engine be done, and the robot look at the tubes until the phase after that."""
+    world.engine(EngineState.DONE, strategy_id=len(world.strategies), action_index=0)
+    world.until(Phase.CHECKING)
+    while world.step().phase == Phase.CHECKING:
+        pass
+
+
+def test_a_pour_that_went_wrong_is_seen_and_the_rest_planned_anew():
+    world = World(goal=GOAL, results=["RR|GG|PP", "R|GGR|PP"])
+    world.until(Phase.PLAYING)
+    finish(world)
+    assert world.flow.report().replans == 1
+    assert world.plans[1][:3] == ("RR|GG|PP", "R|GG|PPR", 1)
+    finish(world)
+    assert world.plans[2][:2] == ("R|GGR|PP", "R|GG|PPR")
+    assert world.strategies[2][2] == {"left": 1, "center": 3, "right": 2}
+    finish(world)
+    report = world.flow.report()
+    assert (report.phase, report.code, report.replans) == (Phase.FINISHED, GameCode.SOLVED, 2)
+    assert [record.action.kind for record in report.actions] == ["pick"] * 3
+    assert len(report.pours) == 1 + 1 + world.plans[2][2]
+
+
+def test_a_game_that_no_new_plan_saves_is_not_solved():
+    world = World(goal=GOAL, results=["RR|GG|PP"] * 3)
+    for _ in range(3):
+        world.until(Phase.PLAYING)
+        finish(world)
+    report = world.flow.report()
+    assert (report.phase, report.code) == (Phase.FAILED, GameCode.NOT_SOLVED)
+    assert report.message == "the tubes hold RR|GG|PP instead of R|GG|PPR after 2 replans"
+
+
+def test_tubes_that_cannot_be_read_leave_a_finished_game_unchecked():
+    world = World(goal=GOAL, results=[""])
+    world.until(Phase.PLAYING)
+    finish(world)
+    report = world.flow.report()
+    assert (report.phase, report.code) == (Phase.FINISHED, GameCode.UNCHECKED)
+    assert "images within 20 s" in report.message
+
+
+def test_each_game_starts_where_the_last_one_ended():
+    world = World(games=2, cards=("R|GG|PPR", "|GGR|PPR"))
+    world.until(Phase.PLAYING)
+    finish(world)
+    assert not world.flow.over
+    world.until(Phase.PLAYING)
+    assert world.strategies[1][2] == {"left": 1, "center": 2, "right": 3}
+    finish(world)
+    assert world.flow.over
+    finished = [report for report in world.reports if report.phase == Phase.FINISHED]
+    assert [(report.game, report.start, report.goal) for report in finished] == [
+        (0, "RR|GG|PP", "R|GG|PPR"), (1, "R|GG|PPR", "|GGR|PPR"),
+    ]
+    assert finished[1].robot_seconds < world.now.robot_s - 7.0 - finished[0].robot_seconds + 0.2
+
+
+def test_the_last_games_card_that_is_still_shown_is_not_taken_for_the_next():
+    world = World(games=2, cards=("R|GG|PPR", "R|GG|PPR", "|GGR|PPR"))
+    world.until(Phase.PLAYING)
+    finish(world)
+    world.until(Phase.PLAYING)
+    assert world.found_cards == ["R|GG|PPR", "|GGR|PPR"]
+
+
+def test_a_replay_commands_nothing_and_ends_when_card_and_tubes_are_found():
+    world = World(robot=False)
+    world.now = replace(world.now, engine=None, head=None)
+    report = world.until(Phase.FINISHED)
+    assert (report.code, world.gazes, world.strategies) == (GameCode.REPLAYED, [], [])
+    assert world.found_cards == ["R|GG|PPR"] and world.found_tubes == [PLACES]
+    assert world.plans[0][:3] == ("RR|GG|PP", "R|GG|PPR", 1)
+
+
+def test_a_recording_without_a_card_ends_with_what_was_not_found_in_it():
+    world = World(robot=False, cards=())
+    world.until(Phase.LOOKING_FOR_CARD)
+    world.frames = False
+    report = world.until(Phase.FAILED)
+    assert report.code == GameCode.NO_CARD
+    assert "the recording gave no image for 5 s" in report.message
+
+
+def test_images_taken_before_the_head_came_to_rest_are_not_looked_at():
+    world = World()
+    world.until(Phase.LOOKING_FOR_CARD)
+    world.now = replace(world.now, head=Gaze(0.0, 0.3))
+    for _ in range(10):
+        world.step()
+    world.now = replace(world.now, head=CARD_GAZE)
+    world.step()
+    for _ in range(2):
+        assert world.step().phase == Phase.LOOKING_FOR_CARD
+    assert world.step().phase == Phase.LOOKING_FOR_TUBES
+
+
+def no_engine(world):
+    world.now = replace(world.now, engine=None)
+
+
+def no_image_ever(world):
+    world.now = replace(world.now, camera_seen=False, camera_problem="no image on camera/image_raw")
+    world.frames = False
+
+
+def no_image_while_looking(world):
+    world.frames = False
+
+
+def head_stuck(world):
+    world.look_at = lambda gaze, duration_s: Answer(EngineCode.OK)
+
+
+def no_card(world):
+    world.cards = []
+
+
+def engine_refuses(world):
+    world.answer = EngineCode.BUSY
+
+
+def engine_hangs(world):
+    world.answer = NO_ANSWER
+
+
+def engine_dies(world):
+    world.until(Phase.LOOKING_FOR_CARD)
+    world.engine_speaks = False
+
+
+@pytest.mark.parametrize(
+    "fault, code, words",
+    [
+        (no_engine, GameCode.NO_ENGINE, "no status of control_engine within 10 s"),
+        (no_image_ever, GameCode.NO_CAMERA, "no image on camera/image_raw within 5 s"),
+        (no_image_while_looking, GameCode.NO_CAMERA, "no image within 5 s"),
+        (head_stuck, GameCode.HEAD_NOT_STILL, "after 4 s"),
+        (no_card, GameCode.NO_CARD, "images within 20 s"),
+        (engine_refuses, GameCode.ENGINE_REFUSED, "control_engine: BUSY: fake"),
+        (engine_hangs, GameCode.ENGINE_LOST, "fake"),
+        (engine_dies, GameCode.ENGINE_LOST, "no status for 3 s"),
+    ],
+)
+def test_every_wait_ends_with_a_name(fault, code, words):
+    world = World()
+    fault(world)
+    report = world.until(Phase.FAILED)
+    assert report.code == code
+    assert words in report.message
+    assert world.flow.over
+
+
+def test_a_fault_of_the_engine_ends_the_game_with_the_engines_own_code():
+    world = World(goal=GOAL, games=3)
+    world.until(Phase.PLAYING)
+    world.engine(EngineState.FAULT, EngineCode.GRASP_EMPTY, action_index=1, message="left hand closed on nothing")
+    report = world.step()
+    assert (report.phase, report.code) == (Phase.FAILED, GameCode.ENGINE_FAULT)
+    assert report.message == "control_engine: GRASP_EMPTY: action 1: left hand closed on nothing"
+    assert world.flow.over
+
+
+def test_a_stop_by_hand_ends_the_game():
+    world = World(goal=GOAL)
+    world.until(Phase.PLAYING)
+    world.engine(EngineState.IDLE, EngineCode.STOPPED, action_index=0, message="stopped on request")
+    assert world.step().code == GameCode.ENGINE_FAULT
+
+
+def test_the_status_of_an_earlier_strategy_does_not_end_the_game():
+    world = World(goal=GOAL)
+    world.until(Phase.PLAYING)
+    world.engine(EngineState.DONE, strategy_id=0)
+    assert world.step().phase == Phase.PLAYING
+
+
+def test_nothing_is_commanded_after_the_end():
+    world = World(cards=())
+    world.until(Phase.FAILED)
+    told = len(world.reports)
+    for _ in range(50):
+        world.step()
+    assert (len(world.reports), world.strategies) == (told, [])
