@@ -167,6 +167,78 @@ def test_a_joint_goal_without_sense_is_refused_by_code(name, goal, code):
     assert caught.value.code == code
 
 
+def test_a_request_to_move_nothing_is_refused():
+    engine = make_engine()
+    IdealRobot(engine)
+    with pytest.raises(ControlError) as caught:
+        engine.move_joints({}, math.nan)
+    assert caught.value.code == EngineCode.INVALID_VALUE
+
+
+@pytest.mark.parametrize(
+    "action, word",
+    [(Action("throw", "left", "left"), "throw"), (Action("pick", "middle", "left"), "middle"), (Action("place", "left", "foo"), "foo")],
+)
+def test_an_action_without_sense_is_refused_before_anything_moves(action, word):
+    with pytest.raises(ControlError, match=word) as caught:
+        make_engine().start([action], PLACES, BALLS)
+    assert caught.value.code == EngineCode.INVALID_ACTION
+
+
+def test_an_unexpected_error_is_a_fault_and_never_success(monkeypatch):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    monkeypatch.setattr(engine.body.arms["left"], "glide", lambda *args: 1 / 0)
+    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.INTERNAL_ERROR and "ZeroDivisionError" in engine.status.message
+
+
+def test_a_gap_in_the_joint_states_delays_a_motion_and_never_makes_it_jump():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.move_joints({"head_p": 0.8}, 1.0)
+    for _ in range(40):
+        robot.cycle()
+    before = robot.joints["head_p"]
+    robot.time += 5.0
+    robot.cycle()
+    assert 0.0 < robot.joints["head_p"] - before <= 3.4 * 0.016
+    assert robot.run() == EngineState.DONE and robot.joints["head_p"] == pytest.approx(0.8)
+
+
+def test_after_lost_joint_states_the_robot_holds_where_it_is_found():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.lose("no joint states")
+    assert engine.tick(9.0, robot.joints | {"l_arm_sh_r": 0.7})["l_arm_sh_r"] == pytest.approx(0.7)
+    assert engine.status.code == EngineCode.JOINT_STATES_LOST
+
+
+def test_a_hand_stopped_with_a_tube_must_be_opened_before_the_next_strategy():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+    while "left" not in engine.body.held:
+        robot.cycle()
+    engine.stop()
+    with pytest.raises(ControlError, match="left fingers"):
+        engine.start([Action("pick", "right", "right")], PLACES, BALLS)
+    engine.move_joints({"l_arm_grip": 0.5}, 1.0)
+    robot.run()
+    engine.start([Action("pick", "right", "right")], PLACES, BALLS)
+    assert robot.run() == EngineState.DONE, engine.status
+
+
+def test_no_strategy_starts_with_the_torso_turned():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.move_joints({"torso_y": 0.3}, 1.0)
+    robot.run()
+    with pytest.raises(ControlError, match="torso_y"):
+        engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+
+
 def test_the_head_goes_where_it_is_told():
     engine = make_engine()
     robot = IdealRobot(engine)

@@ -46,11 +46,13 @@ class ControlEngine:
         self.settings = settings
         self.ranges = self._ranges()
         self._limiter = CommandLimiter(
-            {name: JointLimit(low, high, settings.speeds.hardware) for name, (low, high) in self.ranges.items()}
+            {name: JointLimit(low, high, settings.speeds.hardware) for name, (low, high) in self.ranges.items()},
+            settings.speeds.longest_step,
         )
         self._script: Iterator[Motion] | None = None
         self._motion: Motion | None = None
         self._motion_start = 0.0
+        self._last_tick: float | None = None
         self._lagging_since: dict[str, float] = {}
         self._action_index = -1
         self.status = EngineStatus(EngineState.IDLE, EngineCode.OK, -1, "ready")
@@ -76,19 +78,53 @@ class ControlEngine:
         for tube, foot in places.items():
             if len(foot) != 3 or not all(isfinite(value) for value in foot):
                 raise ControlError(EngineCode.INVALID_VALUE, f"place of tube {tube!r} is {list(foot)}, expected three finite metres")
-        if self.body.held:
-            raise ControlError(EngineCode.INVALID_ACTION, f"a strategy starts with empty hands, held: {sorted(self.body.held)}")
+        self._check_actions(actions, places)
+        self._check_hands_are_empty()
+        torso = self.body.joints.get("torso_y", 0.0)
+        if abs(torso) > self.settings.guards.torso:
+            raise ControlError(EngineCode.OUT_OF_LIMITS, f"torso_y is at {torso:.3f} rad, expected at most {self.settings.guards.torso} from 0")
         self.body.places = {tube: np.array(foot, dtype=float) for tube, foot in places.items()}
         self.durations = []
         self._begin(self._strategy(tuple(actions), dict(balls), method), "strategy accepted")
 
+    @staticmethod
+    def _check_actions(actions: Sequence[Action], places: Mapping[str, Sequence[float]]) -> None:
+        """Raise ControlError for an action that names an unknown kind, a hand the robot lacks or a tube without a place."""
+        for index, action in enumerate(actions):
+            pours = action.kind == "pour"
+            hands = (action.hand, action.target_hand) if pours else (action.hand,)
+            tubes = (action.tube, action.target_tube) if pours else (action.tube,)
+            for name, known in (((action.kind,), ("pick", "place", "pour")), (hands, HANDS), (tubes, tuple(places))):
+                strange = [word for word in name if word not in known]
+                if strange:
+                    raise ControlError(
+                        EngineCode.INVALID_ACTION, f"action {index} ({action}): {strange[0]!r}, expected one of {', '.join(known) or 'none'}"
+                    )
+
+    def _check_hands_are_empty(self) -> None:
+        """Raise ControlError while a tube is known to be held, or while fingers stand where only a tube stops them."""
+        low, high = self.settings.grip.on_tube
+        for hand in HANDS:
+            angle = self.body.joints.get(grip_joint(hand), 0.0)
+            if hand in self.body.held and angle < low:
+                # Opened by request since: whatever was held is no longer.
+                del self.body.held[hand]
+                self.body.pour_ready = None
+            if hand in self.body.held or low <= angle <= high:
+                raise ControlError(
+                    EngineCode.INVALID_ACTION,
+                    f"a strategy starts with empty hands, {hand} fingers are at {angle:.3f} rad, as on a tube; open them first",
+                )
+
     def move_joints(self, goals: Mapping[str, float], duration: float) -> None:
         """Move named joints to positions [rad] in `duration` seconds (0: as quickly as the limits allow). Raises ControlError."""
+        if not goals or not isfinite(duration) or duration < 0.0:
+            raise ControlError(EngineCode.INVALID_VALUE, f"{len(goals)} joints in {duration} s, expected at least one and a finite time")
         for name, goal in goals.items():
             if name not in self.ranges:
                 raise ControlError(EngineCode.UNKNOWN_JOINT, f"joint {name!r}, expected one of {', '.join(sorted(self.ranges))}")
-            if not isfinite(goal) or not isfinite(duration) or duration < 0.0:
-                raise ControlError(EngineCode.INVALID_VALUE, f"{name} to {goal} rad in {duration} s, expected finite values")
+            if not isfinite(goal):
+                raise ControlError(EngineCode.INVALID_VALUE, f"{name} to {goal} rad, expected a finite angle")
             low, high = self.ranges[name]
             if not low - 1e-6 <= goal <= high + 1e-6:
                 raise ControlError(EngineCode.OUT_OF_LIMITS, f"{name} to {goal:.3f} rad, expected {low:.3f} to {high:.3f}")
@@ -108,8 +144,9 @@ class ControlEngine:
         self.status = EngineStatus(EngineState.IDLE, EngineCode.STOPPED, self._action_index, "stopped on request")
 
     def lose(self, message: str) -> None:
-        """Note that joint states no longer arrive; the robot holds its last goals."""
+        """Note that joint states no longer arrive; the robot holds. When they come back, holding starts from what they say."""
         self._fail(EngineCode.JOINT_STATES_LOST, message)
+        self.body.goals = {}
 
     def tick(self, time_s: float, joints: Mapping[str, float]) -> dict[str, float]:
         """Return this cycle's joint goals [rad] given the time [s] and the measured joints [rad]; never NaN, never outside limits."""
@@ -124,6 +161,7 @@ class ControlEngine:
             self._limiter.reset(time_s, self.body.goals)
         wanted = dict(self.body.goals)
         try:
+            self._skip_gap(time_s)
             self._check_tracking(time_s)
             self._advance(time_s)
             if self._motion is not None:
@@ -131,7 +169,16 @@ class ControlEngine:
             self.body.goals.update(self._limiter.apply(time_s, wanted))
         except ControlError as error:
             self._fail(error.code, error.message)
+        except Exception as error:
+            # Whatever went wrong in planning a motion, the robot holds, and nobody is told that all went well.
+            self._fail(EngineCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}")
         return dict(self.body.goals)
+
+    def _skip_gap(self, time_s: float) -> None:
+        """Let a motion go on where it was when joint states were missing for a while, or the clock jumped."""
+        gap = time_s - self._last_tick - self.settings.speeds.longest_step if self._last_tick is not None else 0.0
+        self._motion_start += gap if gap > 0.0 else min(0.0, time_s - (self._last_tick or time_s))
+        self._last_tick = time_s
 
     def _advance(self, time_s: float) -> None:
         """Take the next motion of the script when the present one is over."""

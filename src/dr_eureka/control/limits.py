@@ -21,11 +21,13 @@ class JointLimit:
 class CommandLimiter:
     """Clamp joint goals to range and speed, cycle by cycle; nothing is written to a robot but through this.
 
-    It acts on the commands' own history (open loop), so a late or noisy measurement cannot make it jump.
+    It acts on the commands' own history (open loop), so a late or noisy measurement cannot make it jump. A gap in the cycles
+    allows no more than `longest_step` [s] of movement at once.
     """
 
-    def __init__(self, limits: Mapping[str, JointLimit]):
+    def __init__(self, limits: Mapping[str, JointLimit], longest_step: float):
         self._limits = dict(limits)
+        self._longest_step = longest_step
         self._last: dict[str, float] = {}
         self._time: float | None = None
 
@@ -36,7 +38,7 @@ class CommandLimiter:
 
     def apply(self, time_s: float, goals: Mapping[str, float]) -> dict[str, float]:
         """Return the goals [rad] as they may be written at `time_s`; raise ControlError for an unknown joint or a non-finite goal."""
-        elapsed = max(0.0, time_s - self._time) if self._time is not None else 0.0
+        elapsed = min(max(0.0, time_s - self._time), self._longest_step) if self._time is not None else 0.0
         allowed: dict[str, float] = {}
         for name, goal in goals.items():
             limit = self._limits.get(name)

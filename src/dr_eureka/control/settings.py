@@ -14,9 +14,13 @@ _POSITIVE = {"min": 1e-6}
 
 @dataclass(frozen=True)
 class SpeedSettings:
-    """How fast the arms go: joint speeds [rad/s], accelerations [rad/s^2], hand speed on straight lines [m/s]."""
+    """How fast the arms go: joint speeds [rad/s], accelerations [rad/s^2], hand speed on straight lines [m/s].
+
+    `longest_step` [s]: after a gap in the joint states, motions go on where they were, and one command moves no farther than this long.
+    """
 
     hardware: float = field(metadata={"min": 0.1, "max": 3.5})
+    longest_step: float = field(metadata={"min": 0.008, "max": 0.1})
     move: MotionLimits
     carry: MotionLimits
     line: float = field(metadata={"min": 0.01, "max": 1.0})
@@ -95,10 +99,11 @@ class DirectPourSettings:
 
 @dataclass(frozen=True)
 class GuardSettings:
-    """When the engine gives up: largest tracking error [rad] and for how long [s] it may last."""
+    """When the engine gives up: largest tracking error [rad] and for how long [s] it may last; torso's largest turn [rad]."""
 
     tracking_error: float = field(metadata=_POSITIVE)
     tracking_seconds: float = field(metadata=_POSITIVE)
+    torso: float = field(metadata=_POSITIVE)
 
 
 @dataclass(frozen=True)

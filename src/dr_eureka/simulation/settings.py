@@ -23,6 +23,7 @@ class PhysicsSettings:
     steps_per_cycle: int = field(metadata={"min": 1, "max": 20})
     solver_iterations: int = field(metadata={"min": 10, "max": 500})
     restitution_velocity_threshold: float = field(metadata=_NOT_NEGATIVE)
+    contact_breaking_threshold: float = field(metadata=_POSITIVE)
     ball_mass: float = field(metadata=_POSITIVE)
     tube_mass: float = field(metadata=_POSITIVE)
     wall_boxes: int = field(metadata={"min": 8, "max": 32})

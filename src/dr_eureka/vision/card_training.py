@@ -42,12 +42,12 @@ _COUNTS = [(a, b, 6 - a - b) for a in range(5) for b in range(5) if 0 <= 6 - a -
 class TrainingPlan:
     """How long and on what to train."""
 
-    epochs: int = 20
-    samples_per_epoch: int = 2000
+    epochs: int = 9
+    samples_per_epoch: int = 2500
     batch: int = 8
     peak_rate: float = 3e-3
     seed: int = 1
-    pool: int = 400
+    pool: int = 250
     validation_samples: int = 160
     averaging: float = 0.99  # of the weights kept for use, per step
 
