@@ -1,19 +1,21 @@
 """The course of a game, with fakes for the robot and for what is looked at."""
 
 from dataclasses import replace
+from functools import reduce
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dr_eureka.behaviour.flow_settings import FlowSettings
-from dr_eureka.behaviour.game_flow import GameFlow, Looks
+from dr_eureka.behaviour.game_flow import GameFlow, Looks, pours_until_look
 from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Frame, Gaze, Observation
 from dr_eureka.behaviour.report import GameCode, Phase
 from dr_eureka.control.codes import EngineCode, EngineState
-from dr_eureka.game.state import START, State
+from dr_eureka.game.planner import plan_pours
+from dr_eureka.game.state import START, TUBES, Pour, State
 
-CARD_GAZE, SHEET_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87)
+CARD_GAZE, SHEET_GAZE, WATCH_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87), Gaze(0.0, 0.4)
 SETTINGS = FlowSettings(
     engine_limit=10.0,
     engine_silence=3.0,
@@ -22,11 +24,13 @@ SETTINGS = FlowSettings(
     card_limit=20.0,
     tubes_limit=20.0,
     check_limit=20.0,
+    pours_per_look=3,
     most_replans=2,
     head_duration=1.0,
     head_tolerance=0.02,
     card_gaze=CARD_GAZE,
     sheet_gaze=SHEET_GAZE,
+    watch_gaze=WATCH_GAZE,
 )
 GOAL = State.parse("R|GG|PPR")
 PLACES = {"left": (0.44, 0.11, 0.775), "center": (0.44, 0.0, 0.775), "right": (0.44, -0.11, 0.775)}
@@ -117,6 +121,13 @@ class World:
         self.flow.step(self.now)
         return self.flow.report()
 
+    def until_playing(self):
+        """Go on until the engine carries a strategy out that it was not given before."""
+        before = len(self.strategies)
+        while len(self.strategies) == before:
+            self.step()
+            assert self.flow.report().phase != Phase.FAILED, self.flow.report()
+
     def until(self, phase, steps=400):
         for _ in range(steps):
             if self.step().phase == phase:
@@ -131,7 +142,7 @@ class World:
 
 def test_a_game_goes_from_card_to_plan_to_tubes_to_the_last_action():
     world = World()
-    world.until(Phase.PLAYING)
+    world.until_playing()
     actions, tubes, balls, pour = world.strategies[0]
     assert tubes == PLACES and pour == "lock"
     assert balls == {"left": 2, "center": 2, "right": 2}
@@ -143,7 +154,7 @@ def test_a_game_goes_from_card_to_plan_to_tubes_to_the_last_action():
     assert (report.phase, report.code, report.goal) == (Phase.FINISHED, GameCode.SOLVED, "R|GG|PPR")
     assert [record.action for record in report.actions] == list(actions)
     assert world.flow.over
-    assert world.gazes == [CARD_GAZE, SHEET_GAZE, SHEET_GAZE]
+    assert world.gazes == [CARD_GAZE, SHEET_GAZE, WATCH_GAZE, SHEET_GAZE]
     assert world.phases == [
         Phase.WAITING_FOR_ENGINE, Phase.WAITING_FOR_CAMERA, Phase.LOOKING_FOR_CARD, Phase.PLANNING,
         Phase.LOOKING_FOR_TUBES, Phase.PLAYING, Phase.CHECKING, Phase.FINISHED,
@@ -152,7 +163,7 @@ def test_a_game_goes_from_card_to_plan_to_tubes_to_the_last_action():
 
 def test_actions_carry_the_times_between_which_the_engine_was_at_them():
     world = World(goal=GOAL)
-    world.until(Phase.PLAYING)
+    world.until_playing()
     began_s = world.reports[0].robot_seconds
     for index, steps in ((0, 5), (1, 10), (3, 1)):
         world.engine(EngineState.BUSY, action_index=index)
@@ -166,8 +177,8 @@ def test_actions_carry_the_times_between_which_the_engine_was_at_them():
 
 def test_a_given_goal_is_played_without_looking_for_a_card():
     world = World(goal=GOAL)
-    world.until(Phase.PLAYING)
-    assert world.gazes == [SHEET_GAZE]
+    world.until_playing()
+    assert world.gazes == [SHEET_GAZE, WATCH_GAZE]
     assert Phase.LOOKING_FOR_CARD not in world.phases
 
 
@@ -187,12 +198,14 @@ def finish(world):
 
 def test_a_pour_that_went_wrong_is_seen_and_the_rest_planned_anew():
     world = World(goal=GOAL, results=["RR|GG|PP", "R|GGR|PP"])
-    world.until(Phase.PLAYING)
+    world.until_playing()
     finish(world)
     assert world.flow.report().replans == 1
     assert world.plans[1][:3] == ("RR|GG|PP", "R|GG|PPR", 1)
+    world.until_playing()
     finish(world)
     assert world.plans[2][:2] == ("R|GGR|PP", "R|GG|PPR")
+    world.until_playing()
     assert world.strategies[2][2] == {"left": 1, "center": 3, "right": 2}
     finish(world)
     report = world.flow.report()
@@ -201,10 +214,32 @@ def test_a_pour_that_went_wrong_is_seen_and_the_rest_planned_anew():
     assert len(report.pours) == 1 + 1 + world.plans[2][2]
 
 
+def test_a_long_plan_is_carried_out_in_parts_with_a_look_after_each():
+    goal = State.parse("PR|PRG|G")
+    whole = plan_pours(START, goal)
+    middle = reduce(State.after, whole[: pours_until_look(whole, 3)], START)
+    world = World(goal=goal, results=[str(middle)])
+    world.until_playing()
+    first = world.strategies[0][0]
+    assert sum(action.kind == "pour" for action in first) == pours_until_look(whole, 3) < len(whole)
+    assert [action.kind for action in first].count("pick") == [action.kind for action in first].count("place")
+    finish(world)
+    assert (world.flow.report().phase, world.flow.report().replans) == (Phase.PLAYING, 0)
+    world.until_playing()
+    assert world.strategies[1][2] == {tube: len(balls) for tube, balls in zip(TUBES, middle.tubes)}
+    assert len(world.plans) == 1
+
+
+@pytest.mark.parametrize("least, count", [(1, 2), (2, 2), (3, 3), (4, 5), (9, 5)])
+def test_a_look_waits_while_the_same_two_tubes_are_poured(least, count):
+    pours = [Pour("left", "right"), Pour("right", "left"), Pour("left", "center"), Pour("center", "right"), Pour("center", "right")]
+    assert pours_until_look(pours, least) == count
+
+
 def test_a_game_that_no_new_plan_saves_is_not_solved():
     world = World(goal=GOAL, results=["RR|GG|PP"] * 3)
     for _ in range(3):
-        world.until(Phase.PLAYING)
+        world.until_playing()
         finish(world)
     report = world.flow.report()
     assert (report.phase, report.code) == (Phase.FAILED, GameCode.NOT_SOLVED)
@@ -213,7 +248,7 @@ def test_a_game_that_no_new_plan_saves_is_not_solved():
 
 def test_tubes_that_cannot_be_read_leave_a_finished_game_unchecked():
     world = World(goal=GOAL, results=[""])
-    world.until(Phase.PLAYING)
+    world.until_playing()
     finish(world)
     report = world.flow.report()
     assert (report.phase, report.code) == (Phase.FINISHED, GameCode.UNCHECKED)
@@ -222,10 +257,10 @@ def test_tubes_that_cannot_be_read_leave_a_finished_game_unchecked():
 
 def test_each_game_starts_where_the_last_one_ended():
     world = World(games=2, cards=("R|GG|PPR", "|GGR|PPR"))
-    world.until(Phase.PLAYING)
+    world.until_playing()
     finish(world)
     assert not world.flow.over
-    world.until(Phase.PLAYING)
+    world.until_playing()
     assert world.strategies[1][2] == {"left": 1, "center": 2, "right": 3}
     finish(world)
     assert world.flow.over
@@ -238,9 +273,9 @@ def test_each_game_starts_where_the_last_one_ended():
 
 def test_the_last_games_card_that_is_still_shown_is_not_taken_for_the_next():
     world = World(games=2, cards=("R|GG|PPR", "R|GG|PPR", "|GGR|PPR"))
-    world.until(Phase.PLAYING)
+    world.until_playing()
     finish(world)
-    world.until(Phase.PLAYING)
+    world.until_playing()
     assert world.found_cards == ["R|GG|PPR", "|GGR|PPR"]
 
 
@@ -288,6 +323,11 @@ def no_image_while_looking(world):
     world.frames = False
 
 
+def head_stuck_before_the_pours(world):
+    world.until(Phase.LOOKING_FOR_TUBES)
+    head_stuck(world)
+
+
 def head_stuck(world):
     world.look_at = lambda gaze, duration_s: Answer(EngineCode.OK)
 
@@ -316,6 +356,7 @@ def engine_dies(world):
         (no_image_ever, GameCode.NO_CAMERA, "no image on camera/image_raw within 5 s"),
         (no_image_while_looking, GameCode.NO_CAMERA, "no image within 5 s"),
         (head_stuck, GameCode.HEAD_NOT_STILL, "after 4 s"),
+        (head_stuck_before_the_pours, GameCode.HEAD_NOT_STILL, "head_p=0.4"),
         (no_card, GameCode.NO_CARD, "images within 20 s"),
         (engine_refuses, GameCode.ENGINE_REFUSED, "control_engine: BUSY: fake"),
         (engine_hangs, GameCode.ENGINE_LOST, "fake"),
@@ -333,7 +374,7 @@ def test_every_wait_ends_with_a_name(fault, code, words):
 
 def test_a_fault_of_the_engine_ends_the_game_with_the_engines_own_code():
     world = World(goal=GOAL, games=3)
-    world.until(Phase.PLAYING)
+    world.until_playing()
     world.engine(EngineState.FAULT, EngineCode.GRASP_EMPTY, action_index=1, message="left hand closed on nothing")
     report = world.step()
     assert (report.phase, report.code) == (Phase.FAILED, GameCode.ENGINE_FAULT)
@@ -343,14 +384,14 @@ def test_a_fault_of_the_engine_ends_the_game_with_the_engines_own_code():
 
 def test_a_stop_by_hand_ends_the_game():
     world = World(goal=GOAL)
-    world.until(Phase.PLAYING)
+    world.until_playing()
     world.engine(EngineState.IDLE, EngineCode.STOPPED, action_index=0, message="stopped on request")
     assert world.step().code == GameCode.ENGINE_FAULT
 
 
 def test_the_status_of_an_earlier_strategy_does_not_end_the_game():
     world = World(goal=GOAL)
-    world.until(Phase.PLAYING)
+    world.until_playing()
     world.engine(EngineState.DONE, strategy_id=0)
     assert world.step().phase == Phase.PLAYING
 

@@ -20,8 +20,10 @@ class FlowSettings:
     card_limit: float = field(metadata=_SECONDS)
     tubes_limit: float = field(metadata=_SECONDS)
     check_limit: float = field(metadata=_SECONDS)
+    pours_per_look: int = field(metadata={"min": 1, "max": 100})
     most_replans: int = field(metadata={"min": 0, "max": 20})
     head_duration: float = field(metadata=_SECONDS)
     head_tolerance: float = field(metadata={"min": 0.0, "max": 0.5})
     card_gaze: Gaze
     sheet_gaze: Gaze
+    watch_gaze: Gaze

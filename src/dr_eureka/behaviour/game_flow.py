@@ -7,10 +7,11 @@ tells everything it finds out to a `Listener`. It never waits: each wait is a ph
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, Callable, Mapping, Optional, Protocol, Sequence
 
 from dr_eureka.behaviour.flow_settings import FlowSettings
-from dr_eureka.behaviour.guided_look import GuidedLook, LookFailure
+from dr_eureka.behaviour.guided_look import GuidedLook, HeadMotion, LookFailure
 from dr_eureka.behaviour.observation import NO_ANSWER, Answer, Gaze, Look, Observation, Robot
 from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Phase
 from dr_eureka.control.codes import EngineCode, EngineState
@@ -48,8 +49,8 @@ class Looks:
 class GameFlow:
     """Plays `games` games in a row, each from the state in which the last one ended.
 
-    `goal` replaces the card of the first game. What the tubes hold after a plan is looked at; if it is not the goal, the
-    rest is planned from what was seen. Without a `robot` (a replayed recording) nothing is commanded: every image is
+    `goal` replaces the card of the first game. A plan is carried out in parts; what the tubes hold after each is looked at,
+    and if a pour went wrong, the rest is planned from what was seen. Without a `robot` (a replayed recording) nothing is commanded: every image is
     looked at, for the card first and then for the tubes, and the game ends when both are found.
     """
 
@@ -75,6 +76,7 @@ class GameFlow:
         self._now: Optional[Observation] = None
         self._game_began: Optional[Observation] = None
         self._look: Optional[GuidedLook] = None
+        self._head: Optional[HeadMotion] = None
         self._start_game(0, start, goal)
 
     def _start_game(self, game: int, start: State, goal: Optional[State]) -> None:
@@ -84,10 +86,13 @@ class GameFlow:
         self._code = GameCode.UNDECIDED
         self._message = ""
         self._pours: tuple[Pour, ...] = ()
+        self._pours_ahead: tuple[Pour, ...] = ()
         self._actions: tuple[Action, ...] = ()
         self._records: list[ActionRecord] = []
+        self._part_length = 0
         self._earlier_records = 0
         self._replans = 0
+        self._places: Mapping[str, Any] = {}
         self._strategy_id: Optional[int] = None
         self._game_began = self._now
 
@@ -214,14 +219,13 @@ class GameFlow:
         """Plan from what the tubes hold to the goal; return whether there is anything to do."""
         self._enter(Phase.PLANNING)
         try:
-            pours = plan_pours(self._present, self._goal)
-            self._actions = actions_for(pours)
+            self._pours_ahead = plan_pours(self._present, self._goal)
+            actions = actions_for(self._pours_ahead)
         except DrEurekaError as error:
             self.fail(GameCode.NO_PLAN, str(error))
             return False
-        self._pours += pours
-        self._listener.on_plan(self._present, self._goal, pours, self._actions)
-        if self._robot and not self._actions:
+        self._listener.on_plan(self._present, self._goal, self._pours_ahead, actions)
+        if self._robot and not actions:
             self._finish(GameCode.SOLVED, "the goal is the start: nothing to pour")
             return False
         return True
@@ -237,15 +241,36 @@ class GameFlow:
             self._begin_playing(finding.tubes)
 
     def _begin_playing(self, tubes: Mapping[str, Any]) -> None:
-        self._enter(Phase.PLAYING)
+        """Take the next part of the plan, and turn the head to where its pours will be seen before anything else moves."""
+        gaze = self._settings.watch_gaze
+        count = pours_until_look(self._pours_ahead, self._settings.pours_per_look)
+        part, self._pours_ahead = self._pours_ahead[:count], self._pours_ahead[count:]
+        self._actions = actions_for(part)
+        self._part_length = count
+        self._pours += part
+        self._places = tubes
+        self._strategy_id = None
         self._earlier_records = len(self._records)
+        self._head = HeadMotion(gaze, self._settings, self._now)
+        self._enter(Phase.PLAYING)
+        self._accepted(self._robot.look_at(gaze, self._settings.head_duration))
+
+    def _begin_strategy(self) -> None:
+        arrived = self._head.step(self._now)
+        if isinstance(arrived, LookFailure):
+            self.fail(arrived.code, arrived.message)
+        if arrived is not True:
+            return
         balls = {tube: len(content) for tube, content in zip(TUBES, self._present.tubes)}
-        answer = self._robot.execute(self._actions, tubes, balls, self._pour_method)
+        answer = self._robot.execute(self._actions, self._places, balls, self._pour_method)
         if self._accepted(answer):
             self._strategy_id = answer.strategy_id
 
     def _play(self) -> None:
         engine = self._now.engine
+        if self._strategy_id is None:
+            self._begin_strategy()
+            return
         if engine.strategy_id != self._strategy_id:
             return
         self._record(engine.action_index)
@@ -278,9 +303,13 @@ class GameFlow:
             else:
                 self.fail(outcome.code, outcome.message)
             return
+        expected = reduce(State.after, self._pours[-self._part_length :], self._present)
         self._present = outcome.state
         if self._present == self._goal:
             self._finish(GameCode.SOLVED, "")
+        elif self._present == expected:
+            self._listener.on_tubes(outcome)
+            self._begin_playing(outcome.tubes)
         elif self._replans == self._settings.most_replans:
             seen = f"the tubes hold {self._present} instead of {self._goal}"
             self.fail(GameCode.NOT_SOLVED, f"{seen} after {self._replans} replans")
@@ -296,3 +325,11 @@ class GameFlow:
         if self._game + 1 < self._games:
             self._start_game(self._game + 1, self._goal, None)
             self._begin_card_look()
+
+
+def pours_until_look(pours: Sequence[Pour], least: int) -> int:
+    """Return how many pours to carry out before the next look: `least`, and those that follow with the same two tubes."""
+    count = min(least, len(pours))
+    while count < len(pours) and {pours[count].source, pours[count].target} == {pours[count - 1].source, pours[count - 1].target}:
+        count += 1
+    return count

@@ -59,14 +59,14 @@ class Sight:
         self._subscriber: Optional[rospy.Subscriber] = None
         self.seen = False
         self.problem = f"no image on {rospy.resolve_name(self._topic)}"
-        rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1)
-        rospy.Subscriber("robotis/present_joint_states", JointState, self._on_joints, queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber("camera/camera_info", CameraInfo, self.hear_info, queue_size=1)
+        rospy.Subscriber("robotis/present_joint_states", JointState, self.hear_joints, queue_size=10, tcp_nodelay=True)
 
     def open(self, wanted: bool) -> None:
         """Subscribe to the images or stop doing so; a camera that nobody watches costs nothing."""
         if wanted and self._subscriber is None:
             kind = CompressedImage if self._compressed else Image
-            self._subscriber = rospy.Subscriber(self._topic, kind, self._on_image, queue_size=self._settings.backlog)
+            self._subscriber = rospy.Subscriber(self._topic, kind, self.hear_image, queue_size=self._settings.backlog)
         elif not wanted and self._subscriber is not None:
             self._subscriber.unregister()
             self._subscriber = None
@@ -115,22 +115,25 @@ class Sight:
         coming = newest_s is None or newest_s < stamp_s
         return coming and time.monotonic() - arrived_s < self._settings.pose_limit
 
-    def _on_info(self, info: CameraInfo) -> None:
+    def hear_info(self, info: CameraInfo) -> None:
+        """Take a calibration; the last one counts."""
         with self._lock:
             self._info = info
 
-    def _on_joints(self, state: JointState) -> None:
+    def hear_joints(self, state: JointState) -> None:
+        """Take a joint state; one whose names and positions do not pair up is left out."""
         if len(state.name) == len(state.position):
             with self._lock:
                 self._history.add(state.header.stamp.to_sec(), dict(zip(state.name, state.position)))
 
-    def _on_image(self, message: Image | CompressedImage) -> None:
+    def hear_image(self, message: Image | CompressedImage) -> None:
+        """Keep an image for `take`, unless its stamp is missing, old, or of another time."""
         stamp_s, now_s = message.header.stamp.to_sec(), rospy.get_time()
         with self._lock:
             if stamp_s <= 0.0:
                 self.problem = "image without a time stamp"
             elif self._last_stamp_s - _JUMP_BACK_S < stamp_s <= self._last_stamp_s:
-                self.problem = f"image not newer than the last: both of {stamp_s:.3f} s"
+                self.problem = f"image of {stamp_s:.3f} s, not newer than the last of {self._last_stamp_s:.3f} s"
             elif now_s > 0.0 and abs(now_s - stamp_s) > self._settings.image_max_age:
                 limit_s = self._settings.image_max_age
                 self.problem = f"image of {stamp_s:.3f} s at {now_s:.3f} s: older or newer than {limit_s:g} s"
