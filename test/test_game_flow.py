@@ -57,7 +57,7 @@ class World:
         self.cards = list(cards)
         self.results = list(results)
         self.reports, self.plans, self.found_cards, self.found_tubes = [], [], [], []
-        self.gazes, self.strategies = [], []
+        self.gazes, self.strategies, self.stops = [], [], 0
         self.answer = EngineCode.OK
         self.now = Observation(
             wall_s=100.0,
@@ -95,6 +95,10 @@ class World:
         number = len(self.strategies)
         self.engine(EngineState.BUSY, strategy_id=number)
         return Answer(self.answer, "fake", number)
+
+    def stop(self):
+        self.stops += 1
+        return Answer(EngineCode.OK, "fake")
 
     def engine(self, state, code=EngineCode.OK, strategy_id=1, action_index=-1, message=""):
         self.now = replace(self.now, engine=EngineView(state, code, strategy_id, action_index, message, self.now.wall_s))
@@ -277,6 +281,23 @@ def test_the_last_games_card_that_is_still_shown_is_not_taken_for_the_next():
     finish(world)
     world.until_playing()
     assert world.found_cards == ["R|GG|PPR", "|GGR|PPR"]
+
+
+def test_the_last_games_card_shown_for_ever_ends_at_the_limit():
+    world = World(games=2, cards=("R|GG|PPR",) * 2000)
+    world.until_playing()
+    finish(world)
+    report = world.until(Phase.FAILED, steps=4000)
+    assert report.code == GameCode.NO_CARD
+    assert len(world.gazes) == 5
+
+
+def test_a_game_that_fails_while_the_robot_moves_stops_it():
+    world = World(goal=GOAL)
+    world.until_playing()
+    world.step()
+    world.flow.fail(GameCode.INTERNAL_ERROR, "spoilt on purpose")
+    assert world.stops == 1
 
 
 def test_a_replay_commands_nothing_and_ends_when_card_and_tubes_are_found():

@@ -8,15 +8,8 @@ pytest.importorskip("rospy")
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
-from dr_eureka.nodes.images import (
-    ImageError,
-    camera_from_info,
-    compressed_from_rgb,
-    image_from_rgb,
-    info_from_camera,
-    rgb_from_compressed,
-    rgb_from_image,
-)
+from dr_eureka.bags.images import ImageError, camera_from_info, rgb_from_compressed, rgb_from_image
+from dr_eureka.nodes.images import compressed_from_rgb, image_from_rgb, info_from_camera
 from dr_eureka.vision.camera import CameraError, CameraModel
 
 RGB = np.random.default_rng(1).integers(0, 256, (5, 7, 3), dtype=np.uint8)

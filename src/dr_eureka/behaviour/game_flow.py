@@ -120,7 +120,10 @@ class GameFlow:
         )
 
     def fail(self, code: str, message: str) -> None:
-        """End the game, and any that should follow, with a named code and one line that says why."""
+        """End the game, and any that should follow, with a named code and one line that says why; the robot stops."""
+        engine = self._now.engine if self._now else None
+        if self._robot and engine and engine.state == EngineState.BUSY:
+            self._robot.stop()
         self._code = code
         self._enter(Phase.FAILED, message)
 
@@ -207,8 +210,8 @@ class GameFlow:
         if finding is None:
             return
         if self._game > 0 and finding.state == self._start:
-            # The card of the last game is still being shown: wait for the next one.
-            self._begin_card_look()
+            # The card of the last game is still being shown: wait for the next one, within the same limit.
+            self._look.begin_again(self._looks.card())
             return
         self._goal = finding.state
         self._listener.on_card(finding)

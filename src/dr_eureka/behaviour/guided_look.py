@@ -73,6 +73,10 @@ class GuidedLook:
             return LookFailure(code, f"{reason} within {self._limit_s:g} s", seen=True)
         return None
 
+    def begin_again(self, look: Look) -> None:
+        """Forget the images seen so far; the limit goes on."""
+        self._look = look
+
     def _usable(self, frame: Optional[Frame]) -> bool:
         return frame is not None and (self._head is None or frame.stamp_s >= self._looking_since.robot_s)
 

@@ -82,6 +82,9 @@ class Robot(Protocol):
     def execute(self, actions: Sequence[Action], tubes: Mapping[str, Any], balls: Mapping[str, int], pour: str) -> Answer:
         """Begin a strategy; `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds."""
 
+    def stop(self) -> Answer:
+        """Stop whatever moves, and hold."""
+
 
 class Look(Protocol):
     """A decision that ripens over several images, such as which card is shown."""

@@ -20,7 +20,7 @@ from dr_eureka.nodes import messages
 from dr_eureka.nodes.bag_check import check_bag
 from dr_eureka.nodes.engine_client import EngineClient
 from dr_eureka.nodes.folders import resolve
-from dr_eureka.nodes.parameters import private_parameters, take, take_choice, take_count, take_state, take_state_unless
+from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, take_choice, take_count, take_state, take_state_unless
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.nodes.sight import TRANSPORTS, Sight, SightSettings
 from dr_eureka.pieces import load_pieces
@@ -171,8 +171,10 @@ def _serve() -> int:
     transport = take_choice(parameters, "image_transport", TRANSPORTS)
     take_choice(parameters, "strategy", STRATEGIES)
     replay, stay = take_choice(parameters, "replay", (False, True)), take_choice(parameters, "stay", (False, True))
+    bag = str(parameters.pop("bag", ""))
+    refuse_rest(parameters)
     if replay:
-        check_bag(resolve(str(take(parameters, "bag"))), transport)
+        check_bag(resolve(bag), transport)
 
     reader, pieces = CardReader.load(card_settings), load_pieces()
 

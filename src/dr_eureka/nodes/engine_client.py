@@ -7,6 +7,7 @@ import time
 from typing import Any, Mapping, Optional, Sequence
 
 import rospy
+from std_srvs.srv import Trigger, TriggerRequest
 
 from dr_eureka import msg, srv
 from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Gaze
@@ -22,6 +23,7 @@ class EngineClient:
         self._view: Optional[EngineView] = None
         self._set_joints = rospy.ServiceProxy("control_engine/set_joints", srv.SetJoints)
         self._execute_strategy = rospy.ServiceProxy("control_engine/execute_strategy", srv.ExecuteStrategy)
+        self._stop = rospy.ServiceProxy("control_engine/stop", Trigger)
         rospy.Subscriber("control_engine/status", msg.EngineStatus, self._on_status, queue_size=10)
 
     @property
@@ -44,24 +46,36 @@ class EngineClient:
         )
         return self._ask(self._execute_strategy, request)
 
+    def stop(self) -> Answer:
+        """Stop whatever moves, and hold."""
+        return self._ask(self._stop, TriggerRequest())
+
     def _on_status(self, status: msg.EngineStatus) -> None:
         self._view = messages.engine_view(status, time.monotonic())
 
     def _ask(self, service: rospy.ServiceProxy, request: Any) -> Answer:
-        """Call a service, but never wait longer than the limit: a stopped process would keep rospy waiting for ever."""
+        """Call a service, but never wait longer than the limit: a stopped process would keep rospy waiting for ever.
+
+        A request that was not sent within the limit is not sent later.
+        """
         name = service.resolved_name
         answers: list[Answer] = []
+        given_up = threading.Event()
 
         def call() -> None:
             try:
                 rospy.wait_for_service(name, self._limit_s)
+                if given_up.is_set():
+                    return
                 response = service(request)
                 strategy_id = getattr(response, "strategy_id", 0)
-                answers.append(Answer(messages.engine_code_name(response.result), response.message, strategy_id))
+                result = getattr(response, "result", msg.EngineStatus.OK)
+                answers.append(Answer(messages.engine_code_name(result), response.message, strategy_id))
             except (rospy.ROSException, rospy.ServiceException) as error:
                 answers.append(Answer(NO_ANSWER, f"{name}: {error}"))
 
         caller = threading.Thread(target=call, daemon=True)
         caller.start()
         caller.join(self._limit_s)
+        given_up.set()
         return answers[0] if answers else Answer(NO_ANSWER, f"{name}: no answer within {self._limit_s:g} s")

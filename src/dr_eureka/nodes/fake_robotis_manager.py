@@ -21,7 +21,7 @@ from dr_eureka.game.state import State
 from dr_eureka.nodes import messages
 from dr_eureka.nodes.images import compressed_from_rgb, image_from_rgb, info_from_camera
 from dr_eureka.nodes.lock_step import LockStep
-from dr_eureka.nodes.parameters import private_parameters, take, take_count, take_number, take_state, take_state_unless
+from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, take_count, take_number, take_state, take_state_unless
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.pieces import load_pieces
 from dr_eureka.settings import build
@@ -198,8 +198,12 @@ class FakeRobotisManager:
         self._modules.publish(msg.JointCtrlModule(joint_name=list(modules), module_name=list(modules.values())))
 
     def _follow_game(self, status: msg.GameStatus) -> None:
-        report = messages.report_from_message(status)
-        change = self._cards.follow(report.phase == Phase.LOOKING_FOR_CARD, report.game, State.parse(report.start))
+        try:
+            report = messages.report_from_message(status)
+            change = self._cards.follow(report.phase == Phase.LOOKING_FOR_CARD, report.game, State.parse(report.start))
+        except DrEurekaError as error:
+            rospy.logerr_throttle_identical(1.0, f"dr_eureka_main/status: {error}")
+            return
         if change:
             self._hold_up(change)
 
@@ -247,6 +251,7 @@ def _serve() -> int:
     start, card = take_state(parameters, "start"), take_state_unless(parameters, "card", "random")
     seed = take_count(parameters, "seed", least=0)
     factor = take_number(parameters, "realtime_factor", least=0.0)
+    refuse_rest(parameters)
     textures = SceneTextures(sheet=sheet_image(load_pieces()))
     world = World(world_settings, seed, start, textures, camera=camera)
     matrix = ((camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0))

@@ -14,12 +14,17 @@ from dr_eureka.behaviour.observation import EngineView
 from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Phase
 from dr_eureka.control.codes import EngineCode, EngineState
 from dr_eureka.control.engine import EngineStatus
+from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.actions import Action
 from dr_eureka.game.state import Pour
 from dr_eureka.kinematics.transforms import matrix_to_quaternion
 
 BASE_FRAME = "base"
 CAMERA_FRAME = "cam_link"
+class MessageError(DrEurekaError):
+    """A message that carries a value its definition does not know."""
+
+
 _ENGINE_STATES = (EngineState.IDLE, EngineState.BUSY, EngineState.DONE, EngineState.FAULT)
 # The state BUSY has the plain name in EngineStatus.msg, so the code has another.
 _CODE_CONSTANTS = {code: "ENGINE_BUSY" if code == EngineCode.BUSY else code for code in EngineCode.ALL}
@@ -197,5 +202,8 @@ def report_from_message(status: msg.GameStatus) -> GameReport:
 
 
 def _named(names: Sequence[str], number: int) -> str:
-    """Return the name among `names` whose constant in GameStatus.msg is `number`."""
-    return next(name for name in names if getattr(msg.GameStatus, name) == number)
+    """Return the name among `names` whose constant in GameStatus.msg is `number`; raise MessageError for another number."""
+    for name in names:
+        if getattr(msg.GameStatus, name) == number:
+            return name
+    raise MessageError(f"GameStatus carries the number {number}, expected that of one of {', '.join(names)}")

@@ -32,6 +32,12 @@ def take(parameters: dict[str, Any], key: str) -> Any:
         raise ParameterError(f"{rospy.get_name()}/{key}: parameter is missing; game.launch sets it") from None
 
 
+def refuse_rest(parameters: dict[str, Any]) -> None:
+    """Raise ParameterError when a parameter is left that nobody took: a misspelt name would be ignored."""
+    if parameters:
+        raise ParameterError(f"{rospy.get_name()}/{sorted(parameters)[0]}: unknown parameter; this node does not know it")
+
+
 def take_state(parameters: dict[str, Any], key: str) -> State:
     """Remove a parameter that holds a state of the game and return it."""
     return _convert(State.parse, str(take(parameters, key)), key)

@@ -17,7 +17,7 @@ from dr_eureka.behaviour.scorecard import Ruling, Scorecard
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.nodes import messages
 from dr_eureka.nodes.folders import output_folder
-from dr_eureka.nodes.parameters import private_parameters, take
+from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, take_choice, take_count
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.settings import build
 
@@ -133,9 +133,11 @@ def _serve() -> int:
     parameters = private_parameters()
     settings = build(ScorekeeperSettings, take(parameters, "node"), f"{rospy.get_name()} parameters node")
     folder = output_folder(str(take(parameters, "out")))
+    seed, referee = take_count(parameters, "seed", least=0), take_choice(parameters, "referee", (False, True))
+    refuse_rest(parameters)
     # The result of an earlier game must not be taken for this one's.
     (folder / FILE).unlink(missing_ok=True)
-    return Scorekeeper(folder, take(parameters, "seed"), take(parameters, "referee"), settings).serve()
+    return Scorekeeper(folder, seed, referee, settings).serve()
 
 
 def main() -> int:

@@ -11,10 +11,10 @@ from typing import Optional
 import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
+from dr_eureka.bags.images import ImageError, camera_from_info, rgb_from_compressed, rgb_from_image
 from dr_eureka.behaviour.head_history import HeadHistory
 from dr_eureka.behaviour.observation import Frame, Gaze
 from dr_eureka.kinematics.arms import head_chain
-from dr_eureka.nodes.images import ImageError, camera_from_info, rgb_from_compressed, rgb_from_image
 from dr_eureka.vision.camera import CameraError
 
 TRANSPORTS = ("raw", "compressed")
