@@ -32,6 +32,10 @@ ALLOWED = {
     "nodes": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
 }
 ROS_MODULES = {"cv_bridge", "genpy", "rosbag", "rosgraph", "roslaunch", "roslib", "rospy", "rostest", "std_srvs", "tf2_ros"}
+# Packages that are needed without being imported: generated messages, and what launch files and commands start.
+STARTED = {"message_runtime", "robot_state_publisher", "roslaunch"}
+DEBIAN_PYTHON = {"cv2": "python3-opencv"}
+ONLY_ON_PYPI = {"pybullet", "pybullet_utils", "rosbags"}
 ROS_OF_OURS = {"dr_eureka.msg", "dr_eureka.srv"}
 
 MODULES = {
@@ -166,6 +170,14 @@ def test_cmake_installs_every_program():
     cmake = (ROOT / "CMakeLists.txt").read_text()
     listed = re.search(r"catkin_install_python\(PROGRAMS\s+(.*?)\s+DESTINATION", cmake, re.DOTALL).group(1).split()
     assert listed == [f"scripts/{program.name}" for program in PROGRAMS]
+
+
+def test_the_package_depends_on_what_it_imports_or_starts_and_on_nothing_else():
+    packages = {name.split(".")[0] for names in IMPORTS.values() for name in names}
+    packages -= {"dr_eureka", *sys.stdlib_module_names, *ONLY_ON_PYPI}
+    needed = {name if is_ros(name) else DEBIAN_PYTHON.get(name, f"python3-{name}") for name in packages} | STARTED
+    root = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert {element.text for kind in ("depend", "exec_depend") for element in root.findall(kind)} == needed
 
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda file: file.name)

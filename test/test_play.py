@@ -1,4 +1,4 @@
-"""Running a launch for one game: its own master, and nothing left running."""
+"""`scripts/play` and `scripts/replay`: arguments checked before anything starts, a master of its own, nothing left running."""
 
 import os
 import signal
@@ -10,14 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from dr_eureka.cli.play import own_master_uri
+from dr_eureka.cli import play, replay
+from dr_eureka.cli.launching import own_master_uri, read_arguments
 
 SOURCE = Path(__file__).resolve().parent.parent / "src"
 
 
 def run_family(script, *, interrupt_after=None):
     """Run a shell script under `run_family` in a fresh process; return its exit code and what it printed."""
-    program = f"import os, sys; from dr_eureka.cli.play import run_family; sys.exit(run_family({['sh', '-c', script]!r}, os.environ, grace_s=1.0))"
+    program = f"import os, sys; from dr_eureka.cli.launching import run_family; sys.exit(run_family({['sh', '-c', script]!r}, os.environ, grace_s=1.0))"
     environment = {**os.environ, "PYTHONPATH": str(SOURCE)}
     process = subprocess.Popen([sys.executable, "-c", program], env=environment, stdout=subprocess.PIPE, text=True)
     line = process.stdout.readline()
@@ -63,7 +64,7 @@ def test_a_free_port_is_kept():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         uri = f"http://localhost:{free.getsockname()[1]}"
-    assert own_master_uri(uri) == uri
+    assert own_master_uri("play", uri) == uri
 
 
 def test_a_taken_port_is_left_to_its_owner(capsys):
@@ -71,11 +72,49 @@ def test_a_taken_port_is_left_to_its_owner(capsys):
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         uri = f"http://127.0.0.1:{taken.getsockname()[1]}/"
-        own = own_master_uri(uri)
+        own = own_master_uri("play", uri)
     assert own.startswith("http://localhost:") and own != uri
     assert own in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("uri", ["http://robot:11311", "http://10.0.0.5:11311/"])
 def test_a_master_elsewhere_is_kept(uri):
-    assert own_master_uri(uri) == uri
+    assert own_master_uri("play", uri) == uri
+
+
+@pytest.mark.parametrize(
+    "command, words, complaint",
+    [
+        (play, ["sed:=3"], "play: 'sed' is not an argument of game.launch; expected one of robot, goal, start, games, "),
+        (play, ["seed=3"], "play: 'seed=3': expected ARG:=VALUE, where ARG is one of robot, "),
+        (play, ["robot:=rael"], "play: robot: is 'rael'; expected one of sim, real"),
+        (play, ["games:=two"], "play: games: is 'two'; expected a whole number"),
+        (play, ["out:=/dev/null/x"], "play: out: /dev/null/x: Not a directory; expected a folder"),
+        (replay, [], "replay: no recording given; expected BAG"),
+        (replay, ["rate:=2"], "replay: no recording given; expected BAG"),
+        (replay, ["none.bag"], "none.bag: no such file; expected a bag"),
+        (replay, ["game.bag", "bag:=other.bag"], "replay: bag: is given twice"),
+        (replay, ["game.bag", "seed:=3"], "replay: 'seed' is not an argument of replay.launch; expected one of bag, "),
+        (replay, ["game.bag", "file:=game.bag"], "replay: 'file' is not an argument of replay.launch"),
+    ],
+)
+def test_a_wrong_word_is_one_line_and_starts_nothing(command, words, complaint, monkeypatch, capsys):
+    monkeypatch.setattr(command, "run_launch", lambda *_: pytest.fail("something was started"))
+    assert command.main(words) == 2
+    captured = capsys.readouterr().err
+    assert complaint in captured and captured.count("\n") == 1
+
+
+def test_what_a_launch_file_declares_is_taken():
+    assert read_arguments("game.launch", ["robot:=real", "goal:=RRGG||PP"]) == {"robot": "real", "goal": "RRGG||PP"}
+
+
+def test_a_recording_is_meant_from_where_the_person_is(tmp_path, monkeypatch):
+    given = {}
+    monkeypatch.setattr(replay, "run_launch", lambda _, file, values: given.update(values, file=file) or 1)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    (tmp_path / "a game.bag").touch()
+    assert replay.main(["a game.bag", "rate:=2"]) == 1
+    assert (given["file"], given["bag"], given["rate"]) == ("replay.launch", str(tmp_path / "a game.bag"), "2")
+    assert Path(given["out"]).parent == tmp_path / "dr_eureka" / "replays"

@@ -1,6 +1,8 @@
 """The robot description against ROBOTIS' published kinematics, masses and an independent gravity figure."""
 from __future__ import annotations
 
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 import numpy as np
@@ -147,3 +149,10 @@ def test_closing_moves_both_pads_inward(client):
     assert gaps == sorted(gaps, reverse=True)
     assert gaps[2] == pytest.approx(0.0286, abs=0.0002)
     assert 0.0 < gaps[3] < 0.002
+
+
+def test_a_file_that_cannot_be_written_is_one_line():
+    program = resource_path("scripts/make_robot_description")
+    finished = subprocess.run([sys.executable, str(program), "--out", "/dev/null/x"], capture_output=True, text=True)
+    assert finished.returncode == 2
+    assert finished.stderr == "make_robot_description: /dev/null/x: Not a directory; expected a file that can be written\n"

@@ -1,11 +1,11 @@
-"""What `scripts/play` says about a game, and with what exit code."""
+"""What `scripts/play` and `scripts/replay` say about a game, and with what exit code."""
 
 import json
 import os
 
 import pytest
 
-from dr_eureka.cli.verdict import report
+from dr_eureka.cli.verdict import report, report_replay
 
 GAME = {
     "seed": 3, "start": "RR|GG|PP", "goal": "RRG|G|PP", "verdict": "SOLVED", "solved": True, "balls_lost": 0,
@@ -72,8 +72,26 @@ def test_the_result_of_an_earlier_game_does_not_count(tmp_path):
     assert report(tmp_path, since_s=999) == 0
 
 
-@pytest.mark.parametrize("content", ["{", "[]", "null", '{"games": 3}'])
+@pytest.mark.parametrize("content", ["{", "[]", "null", '{"games": 3}', '{"games": []}'])
 def test_a_broken_result_is_named(tmp_path, capsys, content):
     (tmp_path / "game.json").write_text(content)
     assert report(tmp_path) == 1
     assert "game.json: " in capsys.readouterr().err
+
+
+def test_a_replay_that_found_everything_is_one_line_and_exit_0(tmp_path, capsys):
+    file = write(tmp_path, verdict="REPLAYED", solved=None)
+    assert report_replay(tmp_path) == 0
+    assert capsys.readouterr().out == f"replay: REPLAYED: RR|GG|PP to RRG|G|PP, plan and tubes found; {file}\n"
+
+
+def test_a_replay_that_did_not_says_why(tmp_path, capsys):
+    file = write(tmp_path, verdict="NO_CARD", solved=None, message="no card for 10 s")
+    assert report_replay(tmp_path) == 1
+    assert capsys.readouterr().err == f"replay: NOT REPLAYED: NO_CARD (no card for 10 s); {file}\n"
+
+
+def test_a_replay_without_a_new_result_is_one_line_and_exit_1(tmp_path, capsys):
+    os.utime(write(tmp_path, verdict="REPLAYED"), (1000, 1000))
+    assert report_replay(tmp_path, since_s=1001, launch_code=7) == 1
+    assert f"replay: no game.json in {tmp_path}: the launch ended (exit code 7)" in capsys.readouterr().err

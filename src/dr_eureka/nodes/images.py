@@ -5,17 +5,19 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import rospy
+from cv_bridge import CvBridge
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from dr_eureka.vision.camera import CameraModel
 
+_BRIDGE = CvBridge()
+
 
 def image_from_rgb(rgb: np.ndarray, stamp: rospy.Time, frame_id: str) -> Image:
     """Return an rgb8 message from (height, width, 3) uint8."""
-    message = Image(encoding="rgb8", height=rgb.shape[0], width=rgb.shape[1], step=3 * rgb.shape[1])
+    message = _BRIDGE.cv2_to_imgmsg(np.ascontiguousarray(rgb, dtype=np.uint8), "rgb8")
     message.header.stamp = stamp
     message.header.frame_id = frame_id
-    message.data = np.ascontiguousarray(rgb, dtype=np.uint8).tobytes()
     return message
 
 

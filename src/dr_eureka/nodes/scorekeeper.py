@@ -84,7 +84,7 @@ class Scorekeeper:
         rospy.loginfo("game over: %s", summary)
         games = result.get("games", [result])
         # Without a referee the robot's own verdict has to do.
-        solved = [game["verdict"] == GameCode.SOLVED if game["solved"] is None else game["solved"] for game in games]
+        solved = [game["verdict"] in (GameCode.SOLVED, GameCode.REPLAYED) if game["solved"] is None else game["solved"] for game in games]
         return 0 if all(solved) and self._last_over else 1
 
     def _all_written(self) -> bool:
