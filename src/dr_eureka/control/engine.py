@@ -133,11 +133,6 @@ class ControlEngine:
             raise ControlError(EngineCode.JOINT_STATES_LOST, "no joint state has been received yet")
         self._begin(self._joint_move(dict(goals), duration), f"moving {', '.join(goals)}")
 
-    def home(self) -> None:
-        """Bring the empty arms to the home posture. Raises ControlError."""
-        self._refuse_when_busy()
-        self._begin(go_home(self.body), "going home")
-
     def stop(self) -> None:
         """Stop in this cycle and hold; what is held stays held."""
         self._script = self._motion = None

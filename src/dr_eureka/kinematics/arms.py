@@ -19,7 +19,6 @@ SIDES = ("left", "right")
 ARM_JOINTS = ("sh_p1", "sh_r", "sh_p2", "el_y", "wr_r", "wr_y", "wr_p")
 URDF = "config/robot/thormang3.urdf"
 BASE_LINK = "base"
-GRASP_CENTRE_BEYOND_END = 0.019  # [m] along x of the end frame
 MIRROR_TRANSFORM = np.diag([1.0, -1.0, 1.0, 1.0])
 MIRROR_DELTA = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])  # displacement, then rotation vector (an axial vector)
 
