@@ -14,6 +14,8 @@ set +u
 . "$dr_eureka_made/devel/setup.bash"
 case ":$PATH:" in *":$dr_eureka_made/venv/bin:"*) ;; *) PATH=$dr_eureka_made/venv/bin:$PATH ;; esac
 export PATH
+# What nodes and roslaunch say on stdout and on stderr then stands in the order in which it was said, in files too.
+export PYTHONUNBUFFERED=1
 
 # With a master on this machine keep all of ROS on the loopback interface: nothing then depends on how the host's name
 # resolves, and nobody else can command the robot.

@@ -21,7 +21,8 @@ class Launch:
             ["roslaunch", f"--sigint-timeout={INTERRUPT_S}", "dr_eureka", file, *words],
             stdout=self._output,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "ROS_NAMESPACE": namespace},
+            # Unbuffered, so that what is said on stdout and on stderr stands in the order in which it was said.
+            env={**os.environ, "ROS_NAMESPACE": namespace, "PYTHONUNBUFFERED": "1"},
         )
 
     def wait(self, limit_s):
