@@ -9,8 +9,9 @@ import numpy as np
 
 from dr_eureka.control.arm import Arm
 from dr_eureka.control.codes import ControlError, EngineCode
-from dr_eureka.control.port import HANDS, grip_joint
+from dr_eureka.control.port import grip_joint
 from dr_eureka.control.settings import ControlSettings
+from dr_eureka.game.hands import HANDS
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.pieces import Pieces
 

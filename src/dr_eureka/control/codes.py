@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dr_eureka.errors import DrEurekaError
 
+POUR_METHODS = ("lock", "direct")
+
 
 class EngineState:
     """What the engine is doing."""

@@ -9,15 +9,16 @@ from typing import Iterator, Mapping, Sequence
 import numpy as np
 
 from dr_eureka.control.body import Body
-from dr_eureka.control.codes import ControlError, EngineCode, EngineState
+from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode, EngineState
 from dr_eureka.control.limits import CommandLimiter, JointLimit
 from dr_eureka.control.motion import Follow, Motion
 from dr_eureka.control.picking import go_home, pick, place
-from dr_eureka.control.port import CONTROLLED_JOINTS, HANDS, HEAD_JOINTS, grip_joint
-from dr_eureka.control.pouring import POUR_METHODS, pour, raise_tubes
+from dr_eureka.control.port import CONTROLLED_JOINTS, grip_joint
+from dr_eureka.control.pouring import pour, raise_tubes
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.control.trajectory import JointTrajectory
 from dr_eureka.game.actions import Action
+from dr_eureka.game.hands import HANDS
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.pieces import Pieces
 
@@ -52,6 +53,7 @@ class ControlEngine:
         self._script: Iterator[Motion] | None = None
         self._motion: Motion | None = None
         self._motion_start = 0.0
+        self._now = 0.0
         self._last_tick: float | None = None
         self._lagging_since: dict[str, float] = {}
         self._action_index = -1
@@ -154,11 +156,11 @@ class ControlEngine:
         if not self.body.goals:
             self.body.goals = {name: float(joints[name]) for name in CONTROLLED_JOINTS}
             self._limiter.reset(time_s, self.body.goals)
-        wanted = dict(self.body.goals)
         try:
             self._skip_gap(time_s)
             self._check_tracking(time_s)
             self._advance(time_s)
+            wanted = dict(self.body.goals)
             if self._motion is not None:
                 wanted.update(self._motion.goals(time_s - self._motion_start))
             self.body.goals.update(self._limiter.apply(time_s, wanted))
@@ -171,8 +173,9 @@ class ControlEngine:
 
     def _skip_gap(self, time_s: float) -> None:
         """Let a motion go on where it was when joint states were missing for a while, or the clock jumped."""
-        gap = time_s - self._last_tick - self.settings.speeds.longest_step if self._last_tick is not None else 0.0
-        self._motion_start += gap if gap > 0.0 else min(0.0, time_s - (self._last_tick or time_s))
+        if self._last_tick is not None:
+            elapsed = time_s - self._last_tick
+            self._motion_start += elapsed - min(max(elapsed, 0.0), self.settings.speeds.longest_step)
         self._last_tick = time_s
 
     def _advance(self, time_s: float) -> None:

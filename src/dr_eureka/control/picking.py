@@ -14,14 +14,16 @@ from dr_eureka.control.port import grip_joint
 from dr_eureka.control.trajectory import JointTrajectory, MotionLimits
 from dr_eureka.game.hands import DEFAULT_REACH
 
+
 def _approach_yaw(body: Body, hand: str) -> float:
     yaw = body.settings.pick.approach_yaw
     return yaw if hand == "left" else -yaw
 
 
-def _fingers(body: Body, hand: str, angle: float) -> Follow:
+def _fingers(body: Body, hand: str, angle: float) -> tuple[tuple[str], JointTrajectory]:
+    """Return the track of a `Follow` that brings a hand's fingers to an angle [rad]."""
     joint = grip_joint(hand)
-    return Follow((((joint,), JointTrajectory(np.array([[body.goals[joint]], [angle]]), body.settings.grip.travel_seconds)),))
+    return (joint,), JointTrajectory(np.array([[body.goals[joint]], [angle]]), body.settings.grip.travel_seconds)
 
 
 def _vertical(body: Body, hand: str, height: float, limits: MotionLimits, what: str) -> Follow:
@@ -57,14 +59,12 @@ def pick(body: Body, hand: str, tube: str) -> Iterator[Motion]:
     rest = arm.posture(settings.postures.pick)
     over = level_hand(grasp_centre + settings.pick.lift * UP, _approach_yaw(body, hand), settings.pick.centre_beyond_end)
     way = _level_way(body, hand, over, settings.speeds.move, what, rest)
-    joint = grip_joint(hand)
-    opening = JointTrajectory(np.array([[body.goals[joint]], [settings.grip.open]]), settings.grip.travel_seconds)
-    yield Follow(((arm.joints, way), ((joint,), opening)))
+    yield Follow(((arm.joints, way), _fingers(body, hand, settings.grip.open)))
     yield _vertical(body, hand, -settings.pick.lift, settings.speeds.move, what)
     yield Wait(settled(arm.joints), settings.grip.settle_seconds)
 
-    yield _fingers(body, hand, settings.grip.closed)
-    yield Wait(settled((joint,)), settings.grip.settle_seconds)
+    yield Follow((_fingers(body, hand, settings.grip.closed),))
+    yield Wait(settled((grip_joint(hand),)), settings.grip.settle_seconds)
     body.check_grip(hand, EngineCode.GRASP_EMPTY, f"closed on tube {tube!r}")
     body.held[hand] = Held(tube, tube_in_hand(arm.pose(body.joints), foot))
     del body.places[tube]
@@ -89,7 +89,7 @@ def place(body: Body, hand: str, tube: str, foot: np.ndarray) -> Iterator[Motion
     yield Wait(settled(arm.joints), settings.grip.settle_seconds)
 
     standing = (arm.pose(body.joints) @ held.end_from_tube)[:3, 3]
-    yield _fingers(body, hand, settings.grip.open)
+    yield Follow((_fingers(body, hand, settings.grip.open),))
     yield Wait(settled((grip_joint(hand),)), settings.grip.settle_seconds)
     del body.held[hand]
     body.places[tube] = np.array([standing[0], standing[1], foot[2]])

@@ -6,7 +6,6 @@ from typing import Mapping, Protocol
 
 from dr_eureka.kinematics.arms import arm_joint_names
 
-HANDS = ("left", "right")
 HEAD_JOINTS = ("head_y", "head_p")
 
 

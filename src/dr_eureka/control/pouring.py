@@ -7,6 +7,7 @@ from typing import Iterator
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from dr_eureka.control.arm import Arm
 from dr_eureka.control.body import Body
 from dr_eureka.control.codes import ControlError, EngineCode
 from dr_eureka.control.grasp import hand_for_tube
@@ -16,7 +17,6 @@ from dr_eureka.control.settings import DirectPourSettings, LockPourSettings
 from dr_eureka.control.trajectory import JointTrajectory, SampledTrajectory
 from dr_eureka.kinematics.arms import mirror_transform
 
-POUR_METHODS = ("lock", "direct")
 # Poses per keyframe: joint angles between them follow a cubic spline, which is then within 0.1 mm of the exact lip.
 _POSES_PER_KEYFRAME = 8
 
@@ -66,8 +66,8 @@ def raise_tubes(body: Body) -> Iterator[Motion]:
     body.pour_ready = None
 
 
-def _together(body: Body, moves) -> Follow:
-    """Return joint-space moves of several arms that start and end together."""
+def _together(body: Body, moves: list[tuple[Arm, np.ndarray, np.ndarray]]) -> Follow:
+    """Return joint-space moves of several arms, each from one posture (7,) to another [rad], that start and end together."""
     trajectories = [(arm, arm.move(start, end, body.settings.speeds.carry)) for arm, start, end in moves]
     longest = max(trajectory.duration for _, trajectory in trajectories)
     return Follow(tuple((arm.joints, JointTrajectory(trajectory.points, longest)) for arm, trajectory in trajectories))

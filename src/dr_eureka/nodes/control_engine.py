@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from dr_eureka import msg, srv
-from dr_eureka.control.codes import ControlError, EngineCode
+from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode
 from dr_eureka.control.engine import ControlEngine, EngineStatus
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.kinematics.network import ArmNetwork
@@ -32,7 +32,7 @@ class EngineNodeSettings:
 
     joint_states_timeout: float = field(metadata={"min": 0.02, "max": 60.0})
     status_period: float = field(metadata={"min": 0.01, "max": 1.0})
-    default_pour: str = field(metadata={"choices": ("lock", "direct")})
+    default_pour: str = field(metadata={"choices": POUR_METHODS})
 
 
 class ControlEngineNode:

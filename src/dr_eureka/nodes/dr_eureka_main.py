@@ -14,6 +14,7 @@ from dr_eureka.behaviour.game_flow import GameFlow, Looks
 from dr_eureka.behaviour.looks import CardFinding, CardLook, ResultLook, TubeLook, TubesFinding
 from dr_eureka.behaviour.observation import Frame, Observation
 from dr_eureka.behaviour.report import GameCode, GameReport, Phase
+from dr_eureka.control.codes import POUR_METHODS
 from dr_eureka.game.actions import Action
 from dr_eureka.game.state import Pour, State
 from dr_eureka.nodes import messages
@@ -32,7 +33,6 @@ from dr_eureka.vision.voting import CardVote, TubeVote, VoteSettings
 
 NAME = "dr_eureka_main"
 STRATEGIES = ("fewest",)
-POURS = ("lock", "direct")
 _SECONDS = {"min": 0.01, "max": 600.0}
 # Time for the last, latched messages to leave the process before it ends.
 _LINGER_S = 1.0
@@ -167,7 +167,7 @@ def _serve() -> int:
     start = take_state(parameters, "start")
     goal = take_state_unless(parameters, "goal", "card")
     games = take_count(parameters, "games", least=1)
-    pour = take_choice(parameters, "pour", POURS)
+    pour = take_choice(parameters, "pour", POUR_METHODS)
     transport = take_choice(parameters, "image_transport", TRANSPORTS)
     take_choice(parameters, "strategy", STRATEGIES)
     replay, stay = take_choice(parameters, "replay", (False, True)), take_choice(parameters, "stay", (False, True))
