@@ -6,7 +6,8 @@ import pytest
 from dr_eureka.vision.aruco import marker_image
 from dr_eureka.vision.card_finder import coloured_share, find_candidates, rectify
 from dr_eureka.vision.card_renderer import draw_card
-from dr_eureka.vision.card_scenes import ViewRanges, card_corners, paste_card
+from dr_eureka.vision.card_scenes import paste_card
+from dr_eureka.vision.card_views import ViewRanges, card_corners, sample_view
 from dr_eureka.vision.cards import CardSettings
 
 FINDER = CardSettings.load().finder
@@ -23,10 +24,10 @@ def ground_corners(corners, border):
 @pytest.mark.parametrize("side", [80, 160, 320])
 def test_a_cards_ground_is_found_to_two_pixels_on_any_ground(side, background):
     rng = np.random.default_rng(side + background)
-    ranges = ViewRanges(side=(side, side + 0.01), tilt=(0, 0.7))
+    ranges = ViewRanges(side_px=((side, side + 0.01),), tilt=((0.0, 0.7),))
     drawing = draw_card("RGPR|GP|", rng, 384)
     image = np.full((480, 640, 3), background, np.uint8)
-    corners = card_corners(rng, ranges) + (320, 240)
+    corners = card_corners(sample_view(rng, ranges)) + (320, 240)
     paste_card(image, drawing, corners)
     expected = ground_corners(corners, drawing.style.border)
     best = find_candidates(image, FINDER)[0]

@@ -9,14 +9,15 @@ from dr_eureka.game.state import State, all_states
 from dr_eureka.vision.card_colours import odd_ball
 from dr_eureka.vision.card_detections import CropDetections, SeenBall, SeenFoot
 from dr_eureka.vision.card_layout import LayoutError, columns, read_layout, turned
-from dr_eureka.vision.card_renderer import BALL_COLOURS, lay_out, sample_style
+from dr_eureka.vision.card_renderer import BALL_COLOURS, lay_out
+from dr_eureka.vision.card_style import sample_style
 
 JITTER = 3 / 416  # [fraction of the crop]
 
 
-def seen_card(state, rng, turn=0, feet=(0, 1, 2), jitter=JITTER, wide=True):
+def seen_card(state, rng, turn=0, feet=(0, 1, 2), jitter=JITTER, look="training"):
     """Return what a perfect detector would see of a drawn card, shaken by up to `jitter`, upright after `turn` turns."""
-    drawn_balls, drawn_feet = lay_out(str(state), rng, sample_style(rng, wide), 1.0)
+    drawn_balls, drawn_feet = lay_out(str(state), rng, sample_style(rng, look), 1.0)
     shake = lambda: rng.uniform(-jitter, jitter)
     balls = [SeenBall(b.x + shake(), b.y + shake(), b.diameter, b.colour, 0.99) for b in drawn_balls]
     stands = [SeenFoot(x + shake(), y + shake(), 0.99) for x, y in drawn_feet[list(feet)]]

@@ -3,13 +3,16 @@ import numpy as np
 import pytest
 import torch
 
-from dr_eureka.resources import load_weights
+from dr_eureka.vision.card_architecture import (
+    GRID, RAW_CHANNELS, build_network, parameter_count, to_arrays,
+)
 from dr_eureka.vision.card_detections import SeenBall, collect
 from dr_eureka.vision.card_metrics import average_precision, box_overlap, mean_average_precision
-from dr_eureka.vision.card_network import (
-    GRID, RAW_CHANNELS, CardNetwork, YoloDrEureka, decode, parameter_count, to_arrays,
-)
-from dr_eureka.vision.card_training import CHECKPOINT, CardStream, TrainingPlan, detection_loss, encode, main, train
+from dr_eureka.vision.card_network import CardNetwork, decode
+from dr_eureka.vision.card_stream import CardStream
+from dr_eureka.vision.card_targets import detection_loss, encode
+from dr_eureka.vision.card_training import CHECKPOINT, TrainingPlan, main, train
+from dr_eureka.vision.card_weights import load_detector, save_detector
 
 
 @pytest.fixture(autouse=True)
@@ -18,19 +21,38 @@ def one_thread():
 
 
 def test_the_network_has_about_250_thousand_parameters():
-    assert 225_000 <= parameter_count(YoloDrEureka()) <= 275_000
+    assert 225_000 <= parameter_count(build_network("eureka")) <= 275_000
 
 
 def test_the_third_and_fourth_convolutions_have_stride_2_and_a_crop_gives_a_13_by_13_grid_of_four():
-    network = YoloDrEureka().eval()
+    network = build_network("eureka").eval()
     assert [block[0].stride for block in network.features] == [(1, 1)] * 2 + [(2, 2)] * 2 + [(1, 1)] * 3
     with torch.no_grad():
         assert decode(network(torch.zeros(1, 3, 416, 416))).balls.shape == (1, 13, 13, 4)
 
 
+def test_the_baseline_has_about_eleven_million_parameters_and_the_same_grid():
+    network = build_network("tiny").eval()
+    assert 10_500_000 <= parameter_count(network) <= 11_500_000
+    with torch.no_grad():
+        assert network(torch.zeros(1, 3, 416, 416)).shape == (1, RAW_CHANNELS, GRID, GRID)
+
+
+def test_the_baselines_weights_keep_seven_bits_and_their_places_on_disk(tmp_path):
+    torch.manual_seed(2)
+    arrays = to_arrays(build_network("tiny"))
+    files = save_detector("tiny", arrays, tmp_path)
+    assert all(file.stat().st_size < 4_000_000 for file in files)
+    loaded = load_detector("tiny", tmp_path)
+    assert loaded.keys() == arrays.keys()
+    for name, array in arrays.items():
+        largest = np.abs(array.reshape(len(array), -1)).max(1).reshape(-1, *(1,) * (array.ndim - 1))
+        assert np.all(np.abs(loaded[name] - array) <= largest / 253), name
+
+
 def test_folding_batch_norm_changes_no_output():
     torch.manual_seed(1)
-    network = YoloDrEureka()
+    network = build_network("eureka")
     for module in network.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
             torch.nn.init.uniform_(module.weight, 0.5, 1.5)
@@ -46,14 +68,14 @@ def test_folding_batch_norm_changes_no_output():
 
 
 def test_weights_of_a_wrong_shape_are_refused_by_name():
-    arrays = to_arrays(YoloDrEureka())
+    arrays = to_arrays(build_network("eureka"))
     arrays["kernel2"] = arrays["kernel2"][:, :3]
     with pytest.raises(ValueError, match="kernel2 has shape"):
         CardNetwork(arrays)
 
 
 def test_shipped_weights_fit_the_network():
-    CardNetwork(load_weights("card_detector.npz"))
+    CardNetwork(load_detector("eureka"))
 
 
 def raw_from(ball_grid, foot_grid):
@@ -92,7 +114,7 @@ def test_the_loss_of_a_perfect_output_is_nearly_nothing_and_of_a_shifted_one_is_
 
 
 def test_a_run_that_is_broken_off_and_resumed_ends_with_the_same_weights(tmp_path, monkeypatch):
-    plan = TrainingPlan(epochs=2, samples_per_epoch=2, batch=2, pool=2, validation_samples=1, seed=3)
+    plan = TrainingPlan(epochs=2, peak_rate=3e-3, samples_per_epoch=2, batch=2, pool=2, validation_samples=1, seed=3)
     whole = to_arrays(train(plan, tmp_path / "whole"))
 
     class Broken(Exception):

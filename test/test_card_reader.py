@@ -8,10 +8,14 @@ import pytest
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.vision.aruco import marker_image
 from dr_eureka.vision.card_renderer import draw_card, render_card
-from dr_eureka.vision.card_scenes import ViewRanges, card_corners, degrade, paste_card
+from dr_eureka.vision.card_scenes import paste_card
+from dr_eureka.vision.card_views import ViewRanges, card_corners, degrade, sample_view
 from dr_eureka.vision.cards import CardImageError, CardReader, CardResult, CardSettings
 
-LIGHT = ViewRanges(side=(90, 200), turn=(-0.35, 0.35), tilt=(0.0, 0.35), exposure=(0.8, 1.2), motion_px=2, noise=4)
+LIGHT = ViewRanges(
+    side_px=((90, 200),), turn=((-0.35, 0.35),), tilt=((0.0, 0.35),), exposure=((0.8, 1.2),), motion_px=((1.0, 2.0),),
+    noise=((0.0, 4.0),),
+)
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +30,9 @@ def table(level=110):
 def with_card(state, seed=0, centre=(320, 240), turn=0.0, side=120, image=None):
     """Return a picture of a card lying flat before the camera, and the card's corners."""
     image = table() if image is None else image
-    ranges = replace(LIGHT, side=(side, side + 0.01), turn=(turn, turn + 1e-6), tilt=(0.0, 1e-6))
+    ranges = replace(LIGHT, side_px=((side, side),), turn=((turn, turn),), tilt=((0.0, 0.0),))
     rng = np.random.default_rng(seed)
-    corners = card_corners(rng, ranges) + centre
+    corners = card_corners(sample_view(rng, ranges)) + centre
     paste_card(image, draw_card(state, rng, 384), corners)
     return image, corners
 
@@ -37,8 +41,8 @@ def with_card(state, seed=0, centre=(320, 240), turn=0.0, side=120, image=None):
 def test_a_card_is_read_in_a_random_view(reader, state):
     rng = np.random.default_rng(sum(map(ord, state)))
     image = table()
-    paste_card(image, draw_card(state, rng, 384), card_corners(rng, LIGHT) + (300, 220))
-    reading = reader.read(degrade(image, rng, LIGHT))
+    paste_card(image, draw_card(state, rng, 384), card_corners(sample_view(rng, LIGHT)) + (300, 220))
+    reading = reader.read(degrade(image, sample_view(rng, LIGHT), rng))
     assert (reading.result, reading.state, reading.reason) == (CardResult.OK, state, "")
     assert 0.5 <= reading.confidence <= 1.0 and len(reading.balls) == 6
 

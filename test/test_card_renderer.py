@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 
 from dr_eureka.vision.card_renderer import (
-    BALL_COLOURS, CardRenderError, draw_card, render_card, sample_style,
+    BALL_COLOURS, CardRenderError, draw_card, render_card,
 )
+from dr_eureka.vision.card_style import LOOKS, sample_style
 
 
 def test_equal_seeds_give_equal_cards_and_other_seeds_give_others():
@@ -20,11 +21,11 @@ def test_a_card_is_black_inside_a_white_border():
     assert np.median(card[20:180, 20:180]) < 60
 
 
-@pytest.mark.parametrize("wide", [False, True])
-def test_each_ball_shows_its_colour_where_the_drawing_says(wide):
+@pytest.mark.parametrize("look", LOOKS)
+def test_each_ball_shows_its_colour_where_the_drawing_says(look):
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        drawing = draw_card("RGPG|P|R", rng, 160, sample_style(rng, wide))
+        drawing = draw_card("RGPG|P|R", rng, 160, sample_style(rng, look))
         for ball in drawing.balls:
             pixel = drawing.image[round(ball.y), round(ball.x)].astype(int)
             nearest = min(BALL_COLOURS, key=lambda c: np.abs(np.array(BALL_COLOURS[c][0]) - pixel).sum())
@@ -34,7 +35,7 @@ def test_each_ball_shows_its_colour_where_the_drawing_says(wide):
 def test_all_balls_and_feet_lie_inside_the_border_and_feet_below_the_balls():
     for seed in range(30):
         rng = np.random.default_rng(seed)
-        drawing = draw_card("RGPG|PR|", rng, 100, sample_style(rng, wide=True))
+        drawing = draw_card("RGPG|PR|", rng, 100, sample_style(rng, "training"))
         border = 100 * drawing.style.border
         for ball in drawing.balls:
             assert border < ball.x - ball.diameter / 2 and ball.x + ball.diameter / 2 < 100 - border

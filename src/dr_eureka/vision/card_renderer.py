@@ -1,8 +1,7 @@
 """The game's cards, drawn: textures for the simulator and, with the places of balls and feet, training data.
 
 The art follows the publisher's cards: a white border with rounded corners, a black chalkboard with grey streaks, three
-outlined tubes on disc feet, glossy balls, now and then a wooden bench. Image x runs right and y down; lengths of a
-style are fractions of the card's side.
+outlined tubes on disc feet, glossy balls, now and then a wooden bench. Image x runs right and y down.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import cv2
 import numpy as np
 
 from dr_eureka.errors import DrEurekaError
+from dr_eureka.vision.card_style import CardStyle, sample_style
 
 # Base colour and lower-right crescent of each ball, RGB.
 BALL_COLOURS = {
@@ -27,27 +27,6 @@ _MOST_BALLS = 4
 
 class CardRenderError(DrEurekaError):
     """A card that cannot be drawn: not three tubes, an unknown colour, too many balls, or no pixels."""
-
-
-@dataclass(frozen=True)
-class CardStyle:
-    """How one card is drawn; lengths are fractions of the card's side unless said otherwise."""
-
-    border: float  # width of the white border
-    corner_radius: float  # of the outer corners
-    ball_diameter: float
-    tube_spacing: float  # between neighbouring tube axes
-    group_offset: float  # of the centre tube from the card's middle, to the right
-    foot_line: float  # y of the feet's centres, from the top
-    tube_height: float  # in ball diameters
-    tube_width: float  # in ball diameters
-    foot_width: float  # in ball diameters
-    ball_pitch: float  # between centres of touching balls, in ball diameters
-    outline: float  # stroke of the tubes
-    bench: bool
-    streaks: int
-    gloss: float  # 0 flat .. 1 the publisher's highlight
-    colour_shift: tuple[int, int, int]  # added to every ball colour, RGB levels
 
 
 @dataclass(frozen=True)
@@ -74,40 +53,6 @@ class CardDrawing:
         """Return 1 on the card and 0 outside its rounded corners, (side, side) float32."""
         side = self.image.shape[0]
         return _rounded_mask(side, 0.0, self.style.corner_radius * side)[..., 0]
-
-
-def sample_style(rng: np.random.Generator, wide: bool = False) -> CardStyle:
-    """Return a random style: within the real cards' look, or wider than it for training."""
-    border = rng.uniform(0.04, 0.095) if wide else rng.uniform(0.055, 0.075)
-    diameter = rng.uniform(0.105, 0.15) if wide else rng.uniform(0.118, 0.14)
-    foot_width = rng.uniform(1.5, 1.85) if wide else rng.uniform(1.6, 1.75)
-    half_foot = foot_width * diameter / 2
-    room = 0.5 - border - half_foot - 0.015
-    narrowest = min(foot_width * diameter * (0.96 if wide else 1.02), room)
-    spacing = rng.uniform(narrowest, room)
-    slack = min(room - spacing, 0.12 * spacing)
-    height = rng.uniform(4.5, 4.9) if wide else rng.uniform(4.6, 4.8)
-    highest = border + 0.04 + height * diameter
-    lowest = 1.0 - border - 0.14 * foot_width * diameter - 0.025
-    foot_line = max(lowest - rng.uniform(0.0, 0.09), min(highest, lowest))
-    shift = rng.integers(-22, 23, 3) if wide else rng.integers(-6, 7, 3)
-    return CardStyle(
-        border=border,
-        corner_radius=rng.uniform(0.02, 0.07) if wide else rng.uniform(0.04, 0.055),
-        ball_diameter=diameter,
-        tube_spacing=spacing,
-        group_offset=rng.uniform(-slack, slack),
-        foot_line=foot_line,
-        tube_height=height,
-        tube_width=rng.uniform(1.12, 1.3) if wide else rng.uniform(1.17, 1.23),
-        foot_width=foot_width,
-        ball_pitch=rng.uniform(0.92, 1.03) if wide else rng.uniform(0.96, 1.0),
-        outline=rng.uniform(0.006, 0.014) if wide else rng.uniform(0.008, 0.011),
-        bench=bool(rng.random() < 0.3),
-        streaks=int(rng.integers(0, 40) if wide else rng.integers(8, 22)),
-        gloss=rng.uniform(0.3, 1.0) if wide else rng.uniform(0.8, 1.0),
-        colour_shift=tuple(int(v) for v in shift),
-    )
 
 
 def render_card(state: str, seed: int, side_px: int = 512) -> np.ndarray:
@@ -182,7 +127,8 @@ def _chalkboard(rng: np.random.Generator, side: int, style: CardStyle) -> np.nda
     chalk = cv2.GaussianBlur(chalk, (0, 0), 1.6)
     chalk += rng.normal(0, 3.0, chalk.shape).astype(np.float32)
     chalk = np.clip(cv2.resize(chalk, (side, side), interpolation=cv2.INTER_CUBIC), 0, 67)
-    return np.clip(chalk[..., None] + np.array((23, 23, 21), np.float32), 0, 255).astype(np.uint8)
+    ground = style.ground_level + np.array((0, 0, -2), np.float32)
+    return np.clip(chalk[..., None] + ground, 0, 255).astype(np.uint8)
 
 
 def _draw_bench(canvas: np.ndarray, rng: np.random.Generator, side: int, style: CardStyle) -> None:
@@ -197,6 +143,10 @@ def _draw_bench(canvas: np.ndarray, rng: np.random.Generator, side: int, style: 
             y = int(rng.uniform(upper, lower))
             cv2.line(canvas, (0, y), (side, y + int(rng.integers(-4, 5))), tuple(int(c * 0.88) for c in colour), 1)
         cv2.line(canvas, (0, int(lower)), (side, int(lower)), (92, 55, 28), max(1, side // 200))
+
+
+def _outline_rgb(style: CardStyle) -> tuple[float, float, float]:
+    return (style.outline_level,) * 3
 
 
 def _ellipse(centre: tuple[float, float], axes: tuple[float, float]) -> tuple:
@@ -220,14 +170,14 @@ def _draw_tube_back(canvas: np.ndarray, axis: float, side: int, style: CardStyle
     canvas[top:bottom, left:right] = (inside * 0.86 + 255 * 0.14 * 0.7).astype(np.uint8)
     disc = _ellipse((x, foot), (half_foot, 0.26 * half_foot))
     cv2.ellipse(canvas, *disc, 0, 0, 360, (120, 122, 122), -1, cv2.LINE_AA)
-    cv2.ellipse(canvas, *disc, 0, 0, 360, (238, 240, 240), stroke, cv2.LINE_AA)
+    cv2.ellipse(canvas, *disc, 0, 0, 360, _outline_rgb(style), stroke, cv2.LINE_AA)
 
 
 def _draw_tube_front(canvas: np.ndarray, axis: float, side: int, style: CardStyle) -> None:
     """Draw the white outline: two walls and the ellipse of the mouth."""
     x, foot, mouth, half, _ = _tube_figures(axis, side, style)
     stroke = max(1, int(round(style.outline * side)))
-    white = (238, 240, 240)
+    white = _outline_rgb(style)
     for wall in (x - half, x + half):
         cv2.line(canvas, (int(round(wall)), int(round(mouth))), (int(round(wall)), int(round(foot))), white, stroke,
                  cv2.LINE_AA)
@@ -235,15 +185,17 @@ def _draw_tube_front(canvas: np.ndarray, axis: float, side: int, style: CardStyl
 
 
 def _draw_ball(canvas: np.ndarray, x: float, y: float, diameter: float, colour: str, style: CardStyle) -> None:
-    """Paint one glossy ball: base, crescent at the lower right, blurred highlight at the upper left."""
+    """Paint one glossy ball: base, blurred highlight where the light comes from, crescent opposite."""
     radius = diameter / 2
     x0, y0 = int(np.floor(x - radius)) - 1, int(np.floor(y - radius)) - 1
     size = int(np.ceil(diameter)) + 3
     rows, columns = np.mgrid[y0:y0 + size, x0:x0 + size].astype(np.float32)
     u, v = (columns - x) / radius, (rows - y) / radius
     base, crescent = (np.clip(np.array(c) + style.colour_shift, 0, 255) for c in BALL_COLOURS[colour])
-    shade = 1 / (1 + np.exp(-(np.hypot(u + 0.28, v + 0.28) - 0.98) * 9))[..., None]
-    shine = style.gloss * np.exp(-(((u + 0.36) / 0.25) ** 2 + ((v + 0.42) / 0.18) ** 2))[..., None]
+    light = np.array((np.cos(style.shine_angle), np.sin(style.shine_angle)))
+    towards, aside = u * light[0] + v * light[1], u * light[1] - v * light[0]
+    shade = 1 / (1 + np.exp(-(np.hypot(towards - 0.4, aside) - 0.98) * 9))[..., None]
+    shine = style.gloss * np.exp(-(((towards - 0.55) / 0.18) ** 2 + (aside / 0.25) ** 2))[..., None]
     paint = (base * (1 - shade) + crescent * shade) * (1 - shine) + 255 * shine
     alpha = np.clip((1 - np.hypot(u, v)) * radius + 0.5, 0, 1)[..., None]
     height, width = canvas.shape[:2]

@@ -1,4 +1,4 @@
-"""Cards as a camera sees them: turned, tilted, lit, blurred and compressed; for training and for measuring.
+"""Cards among other things, as training crops and as whole camera pictures with the truth beside them.
 
 Pixels: x right, y down. A card's corners go clockwise from its upper left as printed.
 """
@@ -10,40 +10,24 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from dr_eureka.vision.aruco import marker_image
 from dr_eureka.vision.card_finder import rectify
-from dr_eureka.vision.card_renderer import CardDrawing, sample_style
+from dr_eureka.vision.card_renderer import CardDrawing, draw_card
+from dr_eureka.vision.card_style import sample_style
+from dr_eureka.vision.card_views import View, ViewRanges, card_corners, degrade, sample_view
 
-_CARD_SIDE_M = 0.10
-_FOCAL_PX = 619.0
+_SCENE_PX = (640, 480)
+_TEXTURE_PX = 384
 
 
 @dataclass(frozen=True)
-class ViewRanges:
-    """Ranges that random views are drawn from; turns and tilts in radians, sides in pixels of a 640x480 camera."""
+class CardScene:
+    """A camera picture (480, 640, 3) uint8 RGB with one card in it: its corners (4, 2) [px], drawing, and view."""
 
-    side: tuple[float, float] = (75.0, 330.0)
-    turn: tuple[float, float] = (-np.pi, np.pi)
-    tilt: tuple[float, float] = (0.0, 0.8)
-    exposure: tuple[float, float] = (0.5, 2.0)
-    white_balance: float = 0.12
-    motion_px: float = 5.0
-    defocus_px: float = 1.2
-    noise: float = 9.0
-    jpeg: tuple[int, int] = (35, 96)
-    glare_share: float = 0.15
-
-
-def card_corners(rng: np.random.Generator, ranges: ViewRanges) -> np.ndarray:
-    """Return the four corners (4, 2) of a randomly posed card about its centre, in pixels."""
-    side = np.exp(rng.uniform(*np.log(ranges.side)))
-    turn, tilt, heading = rng.uniform(*ranges.turn), rng.uniform(*ranges.tilt), rng.uniform(-np.pi, np.pi)
-    half = _CARD_SIDE_M / 2
-    card = np.array([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)])
-    in_plane, _ = cv2.Rodrigues(np.array((0, 0, turn)))
-    out_of_plane, _ = cv2.Rodrigues(tilt * np.array((np.cos(heading), np.sin(heading), 0)))
-    points = card @ (out_of_plane @ in_plane).T
-    depth = _FOCAL_PX * _CARD_SIDE_M / side
-    return _FOCAL_PX * points[:, :2] / (points[:, 2:] + depth)
+    image: np.ndarray
+    corners: np.ndarray
+    drawing: CardDrawing
+    view: View
 
 
 def paste_card(image: np.ndarray, drawing: CardDrawing, corners: np.ndarray) -> None:
@@ -67,50 +51,15 @@ def paste_card(image: np.ndarray, drawing: CardDrawing, corners: np.ndarray) -> 
     patch[...] = (patch * (1 - alpha) + paint * alpha).astype(np.uint8)
 
 
-def degrade(image: np.ndarray, rng: np.random.Generator, ranges: ViewRanges) -> np.ndarray:
-    """Return an RGB image as a web camera would deliver it: light, white balance, glare, blur, noise, JPEG."""
-    height, width = image.shape[:2]
-    exposure = np.exp(rng.uniform(*np.log(ranges.exposure)))
-    gain = (exposure * np.exp(rng.normal(0, ranges.white_balance, 3) / 2)).astype(np.float32)
-    slope = rng.uniform(-0.3, 0.3, 2)
-    light = 1 + slope[0] * np.linspace(-1, 1, width)[None] + slope[1] * np.linspace(-1, 1, height)[:, None]
-    view = image.astype(np.float32) * gain * light[..., None].astype(np.float32)
-    if rng.random() < ranges.glare_share:
-        x, y = rng.uniform(0, width), rng.uniform(0, height)
-        spread = rng.uniform(0.08, 0.4) * min(width, height)
-        spot = np.exp(-((np.arange(width) - x)[None] ** 2 + (np.arange(height) - y)[:, None] ** 2) / spread**2)
-        view += (rng.uniform(20, 110) * spot[..., None]).astype(np.float32)
-    if rng.random() < 0.4 and ranges.motion_px >= 1:
-        view = cv2.filter2D(view, -1, _motion_kernel(rng.uniform(1, ranges.motion_px), rng.uniform(0, np.pi)))
-    sigma = rng.uniform(0, ranges.defocus_px)
-    if sigma > 0.3:
-        view = cv2.GaussianBlur(view, (0, 0), sigma)
-    view += rng.normal(0, rng.uniform(0, ranges.noise), view.shape).astype(np.float32)
-    view = np.clip(view, 0, 255).astype(np.uint8)
-    if rng.random() < 0.6:
-        _, packed = cv2.imencode(".jpg", view[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(*ranges.jpeg))])
-        view = np.ascontiguousarray(cv2.imdecode(packed, cv2.IMREAD_COLOR)[..., ::-1])
-    return view
-
-
-def _motion_kernel(length: float, angle: float) -> np.ndarray:
-    """Return a straight motion-blur kernel of a length in pixels."""
-    size = 2 * int(np.ceil(length / 2)) + 3
-    kernel = np.zeros((size, size), np.float32)
-    middle = (size - 1) / 2
-    for along in np.linspace(-length / 2, length / 2, 25):
-        x, y = middle + along * np.cos(angle), middle + along * np.sin(angle)
-        column, row = int(x), int(y)
-        for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
-            kernel[row + dy, column + dx] += (1 - abs(x - column - dx)) * (1 - abs(y - row - dy))
-    return kernel / kernel.sum()
-
-
 def clutter(rng: np.random.Generator, width: int, height: int, things: int) -> np.ndarray:
     """Return an RGB background (height, width, 3): a graded ground with random boxes, discs and lines on it."""
     first, second = rng.uniform(10, 245, (2, 3))
     ramp = np.linspace(0, 1, height)[:, None, None] * np.ones((1, width, 1))
-    image = np.ascontiguousarray((first * ramp + second * (1 - ramp)).astype(np.uint8))
+    image = first * ramp + second * (1 - ramp)
+    if rng.random() < 0.4:
+        grain = rng.normal(0, rng.uniform(4, 25), (height // 12 + 2, width // 12 + 2)).astype(np.float32)
+        image += cv2.resize(grain, (width, height), interpolation=cv2.INTER_LINEAR)[..., None]
+    image = np.clip(image, 0, 255).astype(np.uint8)
     for _ in range(things):
         colour = tuple(int(c) for c in rng.integers(0, 256, 3))
         centre = (int(rng.uniform(0, width)), int(rng.uniform(0, height)))
@@ -130,7 +79,7 @@ def clutter(rng: np.random.Generator, width: int, height: int, things: int) -> n
 def decoy(rng: np.random.Generator, side_px: int) -> CardDrawing:
     """Draw what is no card but has a white border round a dark ground: a marker, a screen with bars, or nothing."""
     image = np.full((side_px, side_px, 3), 245, np.uint8)
-    style = sample_style(rng, wide=True)
+    style = sample_style(rng, "training")
     margin = int(style.border * side_px)
     ground = image[margin:-margin, margin:-margin]
     ground[...] = rng.integers(5, 60)
@@ -147,6 +96,36 @@ def decoy(rng: np.random.Generator, side_px: int) -> CardDrawing:
     return CardDrawing(image, (), np.zeros((0, 2)), style)
 
 
+def random_scene(state: str, rng: np.random.Generator, ranges: ViewRanges, look: str) -> CardScene:
+    """Return a picture of a state's card, drawn in a look, whole somewhere in view among things that are no cards."""
+    width, height = _SCENE_PX
+    image = clutter(rng, width, height, int(rng.integers(0, 12)))
+    for _ in range(int(rng.integers(0, 3))):
+        _put_distractor(image, rng)
+    drawing, view = draw_card(state, rng, _TEXTURE_PX, sample_style(rng, look)), sample_view(rng, ranges)
+    corners = card_corners(view)
+    low, high = corners.min(0) - 1, corners.max(0) + 1
+    corners = corners - low + rng.uniform(0, 1, 2) * np.maximum(_SCENE_PX - (high - low), 0)
+    paste_card(image, drawing, corners)
+    return CardScene(degrade(image, view, rng), corners, drawing, view)
+
+
+def _put_distractor(image: np.ndarray, rng: np.random.Generator) -> None:
+    """Paste a marker on white paper, or another white-bordered thing that is no card, into an RGB image in place."""
+    side = int(rng.integers(40, 160))
+    x, y = (int(rng.integers(-side // 2, size - side // 2)) for size in _SCENE_PX)
+    square = np.array([(x, y), (x + side, y), (x + side, y + side), (x, y + side)], float)
+    if rng.random() < 0.5:
+        print_px = max(side - 2 * (side // 7), 20)
+        paper = np.full((side, side, 3), 245, np.uint8)
+        start = (side - print_px) // 2
+        paper[start:start + print_px, start:start + print_px] = marker_image(int(rng.integers(50)), print_px)[..., None]
+        thing = CardDrawing(paper, (), np.zeros((0, 2)), sample_style(rng))
+    else:
+        thing = decoy(rng, side)
+    paste_card(image, thing, square + rng.normal(0, 0.06 * side, (4, 2)))
+
+
 def rectified_sample(
     drawing: CardDrawing, rng: np.random.Generator, ranges: ViewRanges
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -155,12 +134,13 @@ def rectified_sample(
     The crop is (416, 416, 3) uint8 RGB; balls (n, 4) hold x, y, diameter as fractions of the crop and the class index;
     feet (3, 2) x, y.
     """
-    corners = card_corners(rng, ranges)
+    view = sample_view(rng, ranges)
+    corners = card_corners(view)
     corners -= corners.min(0) - 8
     width, height = (int(v) for v in np.ceil(corners.max(0)) + 8)
     image = clutter(rng, width, height, int(rng.integers(0, 6)))
     paste_card(image, drawing, corners)
-    image = degrade(image, rng, ranges)
+    image = degrade(image, view, rng)
 
     side = drawing.image.shape[0]
     square = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32) - 0.5
