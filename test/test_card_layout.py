@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dr_eureka.game.state import State, all_states
-from dr_eureka.vision.card_colours import odd_ball
+from dr_eureka.vision.card_colours import ODD, PLAIN, oddest_ball
 from dr_eureka.vision.card_detections import CropDetections, SeenBall, SeenFoot
 from dr_eureka.vision.card_layout import LayoutError, columns, read_layout, turned
 from dr_eureka.vision.card_renderer import BALL_COLOURS, lay_out
@@ -135,6 +135,7 @@ def test_a_ball_that_looks_unlike_its_own_colour_is_odd_and_even_light_makes_non
     balls = seen_card("RG|RG|PP", np.random.default_rng(9), jitter=0).balls
     paint = [BALL_COLOURS[ball.colour][0] for ball in balls]
     for light in (0.3, 1.0):
-        assert odd_ball(painted(balls, [tuple(light * v for v in rgb) for rgb in paint]), balls) is None
+        assert oddest_ball(painted(balls, [tuple(light * v for v in rgb) for rgb in paint]), balls)[1] < PLAIN
     paint[1] = BALL_COLOURS["P"][0]  # taken for green, looks purple
-    assert odd_ball(painted(balls, paint), balls).colour in "GP"
+    ball, oddity = oddest_ball(painted(balls, paint), balls)
+    assert ball.colour in "GP" and oddity > ODD

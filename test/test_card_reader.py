@@ -7,6 +7,7 @@ import pytest
 
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.vision.aruco import marker_image
+from dr_eureka.vision.card_network import CardNetwork
 from dr_eureka.vision.card_renderer import draw_card, render_card
 from dr_eureka.vision.card_scenes import paste_card
 from dr_eureka.vision.card_views import ViewRanges, card_corners, degrade, sample_view
@@ -53,6 +54,8 @@ def test_whichever_side_is_down_the_corners_start_at_the_printed_upper_left(read
     reading = reader.read(image)
     assert reading.state == "RGP|PG|R"
     assert np.linalg.norm(reading.corners - corners, axis=1).max() < 4
+    lowest = sorted(reading.balls, key=lambda ball: -ball.y)[:3]
+    assert "".join(ball.colour for ball in sorted(lowest, key=lambda ball: ball.x)) == "RPR"
 
 
 def test_pictures_without_a_card_say_so(reader):
@@ -122,6 +125,15 @@ def test_reading_leaves_the_picture_as_it_was_and_is_repeatable(reader):
     first, second = reader.read(image), reader.read(image)
     assert np.array_equal(image, before)
     assert (first.state, first.confidence) == (second.state, second.confidence)
+
+
+@pytest.mark.parametrize("sure_confidence, looks", [(0.5, 1), (1.0, 2)])
+def test_a_card_beyond_doubt_is_looked_at_once_and_any_other_twice(monkeypatch, sure_confidence, looks):
+    crops, detect = [], CardNetwork.detect
+    monkeypatch.setattr(CardNetwork, "detect", lambda self, crop: crops.append(crop) or detect(self, crop))
+    image, _ = with_card("RGP|PG|R", 3)
+    reading = CardReader.load(replace(CardSettings.load(), sure_confidence=sure_confidence)).read(image)
+    assert (reading.state, len(crops)) == ("RGP|PG|R", looks)
 
 
 def test_missing_weights_are_named():

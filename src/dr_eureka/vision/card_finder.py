@@ -3,13 +3,15 @@
 The paper's way, grey, threshold, contours, four corners, rectify, with three differences. The grey is each pixel's
 smallest channel, in which balls and bench are as dark as the chalkboard and only what is white is bright. Several
 thresholds are tried, so that no exposure is assumed. And the quadrilateral is the black ground inside the white border,
-whose contrast the card brings along, whatever it lies on. Sizes are compared with the picture and with the quadrilateral
+whose contrast the card brings along, whatever it lies on. A picture is searched at a fraction of its size, and at its own
+size only if nothing was found: lines fitted to whole sides lose nothing by that. Sizes are compared with the picture and with the quadrilateral
 itself, never with pixels at an assumed camera height.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -17,7 +19,12 @@ import numpy as np
 CROP_PX = 416
 NOMINAL_BORDER = 0.065  # white border as a share of the card's side
 _SAMPLES_A_SIDE = 16
+_SEARCH_HEIGHT_PX = 240
+_OUTLINES_A_PLACE = 2  # of one card at several thresholds, tried in turn when it cannot be read
+_NEXT = [1, 2, 3, 0]
 _COARSE_PX = 64
+_SIDE_SHARES = np.linspace(0.06, 0.94, _SAMPLES_A_SIDE, dtype=np.float32)[:, None]  # of a side, where it is sampled
+_SAMPLED_SCALES = np.array([1.07, 0.93], np.float32)[:, None, None]  # of the ground: in its border and inside it
 _PLAIN_CHROMA = 0.15  # largest less smallest channel, of the border's white; purple, the palest ball, has 0.32
 
 
@@ -42,7 +49,7 @@ class Candidate:
     side_px: float
     quality: float
 
-    @property
+    @cached_property
     def centre(self) -> np.ndarray:
         return self.ground.mean(0)
 
@@ -50,32 +57,61 @@ class Candidate:
 def find_candidates(image_rgb: np.ndarray, settings: FinderSettings) -> list[Candidate]:
     """Return quadrilaterals that may be cards in an RGB image (h, w, 3) uint8, best first; the same card may repeat."""
     red, green, blue = cv2.split(image_rgb)
-    smooth = cv2.GaussianBlur(cv2.min(cv2.min(red, green), blue), (3, 3), 0)
-    white = max(float(np.percentile(smooth[::4, ::4], 99.5)), 16.0)
-    smallest = settings.smallest_side * image_rgb.shape[0]
-    found = []
+    whiteness = cv2.min(cv2.min(red, green), blue)
+    step = image_rgb.shape[0] // _SEARCH_HEIGHT_PX
+    if step >= 2:
+        height, width = (length // step * step for length in whiteness.shape)
+        small = cv2.resize(whiteness[:height, :width], (width // step, height // step), interpolation=cv2.INTER_AREA)
+        found = _search(small, step, settings)
+        if found:
+            return found
+    return _search(cv2.GaussianBlur(whiteness, (3, 3), 0), 1, settings)
+
+
+def _search(smooth: np.ndarray, scale: int, settings: FinderSettings) -> list[Candidate]:
+    """Return the candidates, best first, in a grey picture (h, w) uint8 each pixel of which is `scale` wide."""
+    white = max(float(np.percentile(smooth[::2, ::2], 99.5)), 16.0)
+    smallest = settings.smallest_side * smooth.shape[0]
+    rough = []
     for level in np.linspace(0.0, white, settings.threshold_steps + 2)[1:-1]:
         _, dark = cv2.threshold(smooth, level, 255, cv2.THRESH_BINARY_INV)
         contours, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         for contour in contours:
-            if len(contour) < 3 * smallest:
-                continue
-            rough = _four_corners(contour, smallest, settings)
-            # Most outlines have no border round a dark ground: they are dropped before the costlier refinement.
-            if rough is None or np.subtract(*_border_and_inside(smooth, rough)).min() <= 0:
-                continue
-            ground = _refine(contour[:, 0, :].astype(np.float32), rough)
-            if ground is None or not _filled(contour, ground, settings):
-                continue
-            border, inside = _border_and_inside(smooth, ground)
-            contrast = float((border - inside).min()) / white
-            if contrast >= settings.least_contrast:
-                side = float(np.sqrt(cv2.contourArea(ground)))
-                # An edge that is blurred lies where its threshold is halfway: other levels see a card too small or large.
-                bias = abs(level - (border + inside).mean() / 2) / (border - inside).mean()
-                found.append(Candidate(ground, side, min(contrast, 1.0) * max(1.0 - bias, 0.1)))
+            polygon = _four_corners(contour, smallest, settings) if len(contour) >= 3 * smallest else None
+            quality = 0.0 if polygon is None else _quality(smooth, polygon, level, white, settings.least_contrast / 2)
+            if quality > 0.0:
+                rough.append((Candidate(polygon, float(np.sqrt(cv2.contourArea(polygon))), quality), contour, level))
+    rough.sort(key=lambda outline: -outline[0].quality)
+    found: list[Candidate] = []
+    for outline, contour, level in rough:
+        if sum(_same_place(outline, other, scale) for other in found) == _OUTLINES_A_PLACE:
+            continue
+        ground = _refine(contour[:, 0, :].astype(np.float32), outline.ground)
+        if ground is None or not _filled(contour, ground, settings):
+            continue
+        quality = _quality(smooth, ground, level, white, settings.least_contrast)
+        if quality > 0.0:
+            ground = (ground + 0.5) * scale - 0.5  # pixel centres of the small picture in the large one
+            found.append(Candidate(ground, float(np.sqrt(cv2.contourArea(ground))), quality))
     found.sort(key=lambda candidate: -candidate.quality)
     return found
+
+
+def _quality(smooth: np.ndarray, ground: np.ndarray, level: float, white: float, least_contrast: float) -> float:
+    """Return how well a ground found at a threshold contrasts with its border, 0..1; 0 for less than the least."""
+    border, inside = _border_and_inside(smooth, ground)
+    contrast = float((border - inside).min()) / white
+    if contrast <= least_contrast:
+        return 0.0
+    # An edge that is blurred lies where its threshold is halfway: other levels see a card too small or large.
+    bias = abs(level - (border + inside).mean() / 2) / (border - inside).mean()
+    return min(contrast, 1.0) * max(1.0 - bias, 0.1)
+
+
+def _same_place(one: Candidate, other: Candidate, scale: int = 1) -> bool:
+    """Tell whether two candidates have nearly one place and size; `scale` enlarges the first."""
+    near = np.hypot(*(scale * one.centre - other.centre)) < 0.15 * other.side_px
+    return bool(near) and 0.8 < scale * one.side_px / other.side_px < 1.25
 
 
 def group(candidates: list[Candidate], most: int) -> list[list[Candidate]]:
@@ -83,9 +119,7 @@ def group(candidates: list[Candidate], most: int) -> list[list[Candidate]]:
     groups: list[list[Candidate]] = []
     for candidate in candidates:
         for members in groups:
-            first = members[0]
-            near = np.linalg.norm(candidate.centre - first.centre) < 0.15 * first.side_px
-            if near and 0.8 < candidate.side_px / first.side_px < 1.25:
+            if _same_place(candidate, members[0]):
                 members.append(candidate)
                 break
         else:
@@ -127,7 +161,7 @@ def _four_corners(contour: np.ndarray, smallest: float, settings: FinderSettings
             break
     if len(polygon) != 4:
         return None
-    sides = np.linalg.norm(polygon - np.roll(polygon, 1, 0), axis=1)
+    sides = np.linalg.norm(polygon[_NEXT] - polygon, axis=1)
     if sides.min() < smallest or sides.max() > settings.longest_aspect * sides.min():
         return None
     # A positive area runs clockwise when y points down.
@@ -146,7 +180,7 @@ def _refine(contour: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
     """Move a polygon's corners to where lines through the middles of its sides meet: the card's corners are round."""
     lines = []
     middle = polygon.mean(0)
-    for start, end in zip(polygon, np.roll(polygon, -1, 0)):
+    for start, end in zip(polygon, polygon[_NEXT]):
         length = np.linalg.norm(end - start)
         if length < 4:
             return None
@@ -176,13 +210,11 @@ def _refine(contour: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
 def _border_and_inside(whiteness: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the level of the white border and that just inside the ground, for each of the four sides."""
     middle = ground.mean(0)
-    shares = np.linspace(0.06, 0.94, _SAMPLES_A_SIDE)[:, None]
-
-    def around(scale: float) -> np.ndarray:
-        corners = middle + scale * (ground - middle)
-        points = [a + shares * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0))]
-        x, y = np.array(points, np.float32).transpose(2, 0, 1)
-        return cv2.remap(whiteness, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
-
+    corners = middle + _SAMPLED_SCALES * (ground - middle)
+    along = corners[:, _NEXT] - corners
+    x, y = (corners[:, :, None] + _SIDE_SHARES * along[:, :, None]).reshape(-1, _SAMPLES_A_SIDE, 2).transpose(2, 0, 1)
+    levels = cv2.remap(whiteness, np.ascontiguousarray(x), np.ascontiguousarray(y), cv2.INTER_LINEAR,
+                       borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+    levels.sort(axis=1)
     # A quarter of the border may be hidden; inside, three white feet may leave little of a side dark.
-    return np.percentile(around(1.07), 25, axis=1), np.percentile(around(0.93), 15, axis=1)
+    return levels[:4, _SAMPLES_A_SIDE // 4].astype(float), levels[4:, _SAMPLES_A_SIDE // 7].astype(float)

@@ -52,7 +52,7 @@ class CardDrawing:
     def outline_mask(self) -> np.ndarray:
         """Return 1 on the card and 0 outside its rounded corners, (side, side) float32."""
         side = self.image.shape[0]
-        return _rounded_mask(side, 0.0, self.style.corner_radius * side)[..., 0]
+        return _rounded_mask(side, 0.0, self.style.corner_radius * side)
 
 
 def render_card(state: str, seed: int, side_px: int = 512) -> np.ndarray:
@@ -127,8 +127,8 @@ def _chalkboard(rng: np.random.Generator, side: int, style: CardStyle) -> np.nda
     chalk = cv2.GaussianBlur(chalk, (0, 0), 1.6)
     chalk += rng.normal(0, 3.0, chalk.shape).astype(np.float32)
     chalk = np.clip(cv2.resize(chalk, (side, side), interpolation=cv2.INTER_CUBIC), 0, 67)
-    ground = style.ground_level + np.array((0, 0, -2), np.float32)
-    return np.clip(chalk[..., None] + ground, 0, 255).astype(np.uint8)
+    grey = (chalk + style.ground_level).astype(np.uint8)
+    return cv2.merge((grey, grey, cv2.subtract(grey, 2)))
 
 
 def _draw_bench(canvas: np.ndarray, rng: np.random.Generator, side: int, style: CardStyle) -> None:
@@ -210,14 +210,16 @@ def _draw_border(canvas: np.ndarray, side: int, style: CardStyle) -> None:
     inner_radius = 0.6 * style.corner_radius * side
     ground = _rounded_mask(side, style.border * side, inner_radius)
     card = _rounded_mask(side, 0.0, style.corner_radius * side)
-    framed = canvas * ground + np.float32(246) * (1 - ground)
-    canvas[...] = (framed * card + np.array(SURROUND_RGB, np.float32) * (1 - card)).astype(np.uint8)
+    for mask, colour in ((ground, (246, 246, 246)), (card, SURROUND_RGB)):
+        outside = mask < 1
+        share = mask[outside][:, None]
+        canvas[outside] = (canvas[outside] * share + np.array(colour, np.float32) * (1 - share)).astype(np.uint8)
 
 
 def _rounded_mask(side: int, margin: float, radius: float) -> np.ndarray:
-    """Return a (side, side, 1) float mask, 1 inside a rounded square inset by the margin."""
-    reach = side / 2 - margin - radius
+    """Return a (side, side) float32 mask, 1 inside a rounded square inset by the margin."""
+    reach = np.float32(side / 2 - margin - radius)
     away = np.abs(np.arange(side, dtype=np.float32) + 0.5 - side / 2) - reach
     x, y = away[None, :], away[:, None]
     outside = np.hypot(np.maximum(x, 0), np.maximum(y, 0)) + np.minimum(np.maximum(x, y), 0)
-    return np.clip(radius - outside + 0.5, 0, 1)[..., None].astype(np.float32)
+    return np.clip(radius - outside + 0.5, 0, 1)

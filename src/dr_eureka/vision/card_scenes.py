@@ -54,12 +54,12 @@ def paste_card(image: np.ndarray, drawing: CardDrawing, corners: np.ndarray) -> 
 def clutter(rng: np.random.Generator, width: int, height: int, things: int) -> np.ndarray:
     """Return an RGB background (height, width, 3): a graded ground with random boxes, discs and lines on it."""
     first, second = rng.uniform(10, 245, (2, 3))
-    ramp = np.linspace(0, 1, height)[:, None, None] * np.ones((1, width, 1))
-    image = first * ramp + second * (1 - ramp)
+    ramp = np.linspace(0, 1, height, dtype=np.float32)[:, None, None]
+    image = np.broadcast_to(first.astype(np.float32) * ramp + second.astype(np.float32) * (1 - ramp), (height, width, 3))
     if rng.random() < 0.4:
         grain = rng.normal(0, rng.uniform(4, 25), (height // 12 + 2, width // 12 + 2)).astype(np.float32)
-        image += cv2.resize(grain, (width, height), interpolation=cv2.INTER_LINEAR)[..., None]
-    image = np.clip(image, 0, 255).astype(np.uint8)
+        image = np.clip(image + cv2.resize(grain, (width, height), interpolation=cv2.INTER_LINEAR)[..., None], 0, 255)
+    image = image.astype(np.uint8, order="C")
     for _ in range(things):
         colour = tuple(int(c) for c in rng.integers(0, 256, 3))
         centre = (int(rng.uniform(0, width)), int(rng.uniform(0, height)))

@@ -5,7 +5,7 @@ Lengths are fractions of the card's side unless said otherwise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,7 +56,6 @@ class _StyleRanges:
     shine_spread: float  # [rad] of the highlight about the upper left
     colour_shift: Bands  # size of the shift of each channel, either way
     closest_feet: float  # narrowest spacing, in foot widths
-    lowest_foot: float  # how far the feet may stand above the lowest place
 
 
 _RANGES = {
@@ -64,13 +63,13 @@ _RANGES = {
         border=((0.055, 0.075),), corner_radius=((0.04, 0.055),), ball_diameter=((0.118, 0.14),),
         tube_height=((4.6, 4.8),), tube_width=((1.17, 1.23),), foot_width=((1.6, 1.75),), ball_pitch=((0.96, 1.0),),
         outline=((0.008, 0.011),), outline_level=((235, 245),), ground_level=((20, 25),), streaks=((8, 21),),
-        gloss=((0.8, 1.0),), shine_spread=0.1, colour_shift=((0, 6),), closest_feet=1.02, lowest_foot=0.09,
+        gloss=((0.8, 1.0),), shine_spread=0.1, colour_shift=((0, 6),), closest_feet=1.02,
     ),
     "training": _StyleRanges(
         border=((0.04, 0.095),), corner_radius=((0.02, 0.07),), ball_diameter=((0.105, 0.15),),
         tube_height=((4.5, 4.9),), tube_width=((1.12, 1.3),), foot_width=((1.5, 1.85),), ball_pitch=((0.92, 1.03),),
         outline=((0.006, 0.014),), outline_level=((180, 255),), ground_level=((8, 50),), streaks=((0, 40),),
-        gloss=((0.3, 1.0),), shine_spread=np.pi, colour_shift=((0, 22),), closest_feet=0.96, lowest_foot=0.09,
+        gloss=((0.3, 1.0),), shine_spread=np.pi, colour_shift=((0, 22),), closest_feet=0.96,
     ),
     "held_out": _StyleRanges(
         border=((0.032, 0.04), (0.095, 0.105)), corner_radius=((0.01, 0.02), (0.07, 0.09)),
@@ -78,18 +77,23 @@ _RANGES = {
         tube_width=((1.08, 1.12), (1.3, 1.36)), foot_width=((1.42, 1.5), (1.85, 1.95)), ball_pitch=((1.03, 1.05),),
         outline=((0.004, 0.006), (0.014, 0.017)), outline_level=((150, 180),), ground_level=((50, 62),),
         streaks=((40, 60),), gloss=((0.0, 0.3),), shine_spread=np.pi, colour_shift=((22, 28),), closest_feet=0.96,
-        lowest_foot=0.09,
     ),
 }
+_OUTSIDE = 2  # figures of a held-out style that lie outside of training's
+_FIGURES = ("border", "corner_radius", "ball_diameter", "tube_height", "tube_width", "foot_width", "ball_pitch", "outline",
+            "outline_level", "ground_level", "streaks", "gloss", "colour_shift")
 
 
 def sample_style(rng: np.random.Generator, look: str = "real") -> CardStyle:
-    """Return a random style of a look: `real`, `training` (wider), or `held_out` (each figure outside of training's).
+    """Return a random style of a look: `real`, `training` (wider), or `held_out` (two figures outside of training's).
 
     What the geometry ties together, spacing and place of the tubes, follows from the other figures. Raises KeyError for
     any other look.
     """
     ranges = _RANGES[look]
+    if look == "held_out":
+        chosen = rng.choice(_FIGURES, _OUTSIDE, replace=False)
+        ranges = replace(_RANGES["training"], **{name: getattr(ranges, name) for name in chosen})
     border, diameter = draw(rng, ranges.border), draw(rng, ranges.ball_diameter)
     foot_width, tube_height = draw(rng, ranges.foot_width), draw(rng, ranges.tube_height)
     room = 0.5 - border - foot_width * diameter / 2 - 0.015
@@ -104,7 +108,7 @@ def sample_style(rng: np.random.Generator, look: str = "real") -> CardStyle:
         ball_diameter=diameter,
         tube_spacing=spacing,
         group_offset=rng.uniform(-slack, slack),
-        foot_line=max(lowest - rng.uniform(0.0, ranges.lowest_foot), min(highest, lowest)),
+        foot_line=max(lowest - rng.uniform(0.0, 0.09), min(highest, lowest)),
         tube_height=tube_height,
         tube_width=draw(rng, ranges.tube_width),
         foot_width=foot_width,

@@ -39,7 +39,7 @@ class View:
 class ViewRanges:
     """What views are drawn from; names and units as in View.
 
-    With `usual` given, a view takes two of its quantities from these ranges and all others from the usual ones.
+    With `usual` given, a view takes one of its quantities from these ranges and all others from the usual ones.
     """
 
     side_px: Bands = ((75.0, 330.0),)
@@ -58,7 +58,7 @@ class ViewRanges:
 
 
 TRAINING_VIEWS = ViewRanges()
-# Outside of training's in two of these six at a time: all at once would leave nothing to see.
+# Outside of training's in one of these six at a time: all at once would leave nothing to see.
 HELD_OUT_VIEWS = ViewRanges(
     side_px=((62.0, 75.0), (330.0, 380.0)), tilt=((0.8, 0.92),), exposure=((0.42, 0.5), (2.0, 2.3)), motion_px=((5.0, 6.5),),
     motion_share=1.0, noise=((9.0, 12.0),), jpeg=((25.0, 35.0),), jpeg_share=1.0, usual=TRAINING_VIEWS,
@@ -70,8 +70,8 @@ def sample_view(rng: np.random.Generator, ranges: ViewRanges) -> View:
     """Return a random view."""
     if ranges.usual is not None:
         outside = sample_view(rng, replace(ranges, usual=None))
-        chosen = rng.choice(_HELD_OUT, 2, replace=False)
-        return replace(sample_view(rng, ranges.usual), **{name: getattr(outside, name) for name in chosen})
+        chosen = str(rng.choice(_HELD_OUT))
+        return replace(sample_view(rng, ranges.usual), **{chosen: getattr(outside, chosen)})
     glare = None
     if rng.random() < ranges.glare_share:
         glare = (rng.uniform(0, 1), rng.uniform(0, 1), rng.uniform(0.08, 0.4), rng.uniform(20, 110))
@@ -115,9 +115,9 @@ def degrade(image: np.ndarray, view: View, rng: np.random.Generator) -> np.ndarr
     The generator draws the noise and nothing else.
     """
     height, width = image.shape[:2]
-    across, down = np.linspace(-1, 1, width), np.linspace(-1, 1, height)[:, None]
-    light = view.exposure * (1 + view.slope[0] * across[None] + view.slope[1] * down)
-    seen = image.astype(np.float32) * np.array(view.white_balance, np.float32) * light[..., None].astype(np.float32)
+    across, down = np.linspace(-1, 1, width)[None], np.linspace(-1, 1, height)[:, None]
+    light = (view.exposure * (1 + view.slope[0] * across + view.slope[1] * down)).astype(np.float32)
+    seen = image * (light[..., None] * np.array(view.white_balance, np.float32))
     if view.glare is not None:
         x, y, spread, level = view.glare
         apart = (np.arange(width)[None] - x * width) ** 2 + (np.arange(height)[:, None] - y * height) ** 2
@@ -126,8 +126,10 @@ def degrade(image: np.ndarray, view: View, rng: np.random.Generator) -> np.ndarr
         seen = cv2.filter2D(seen, -1, _motion_kernel(view.motion_px, view.motion_angle))
     if view.defocus_px > 0.3:
         seen = cv2.GaussianBlur(seen, (0, 0), view.defocus_px)
-    seen += view.noise * rng.standard_normal(seen.shape, np.float32)
-    seen = np.clip(seen, 0, 255).astype(np.uint8)
+    noise = rng.standard_normal(seen.shape, np.float32)
+    noise *= view.noise
+    seen += noise
+    seen = np.clip(seen, 0, 255, out=seen).astype(np.uint8)
     if view.jpeg is None:
         return seen
     _, packed = cv2.imencode(".jpg", seen[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, view.jpeg])

@@ -11,12 +11,12 @@ from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.state import COLOUR_NAMES
 from dr_eureka.resources import WeightsError, load_weights, load_yaml
 from dr_eureka.settings import build
-from dr_eureka.vision.card_colours import odd_ball
+from dr_eureka.vision.card_colours import ODD, PLAIN, oddest_ball
 from dr_eureka.vision.card_detections import CropDetections, SeenBall, collect
 from dr_eureka.vision.card_finder import (
     NOMINAL_BORDER, Candidate, FinderSettings, coloured_share, find_candidates, group, rectify,
 )
-from dr_eureka.vision.card_layout import CardLayout, LayoutError, read_layout
+from dr_eureka.vision.card_layout import CardLayout, LayoutError, read_layout, turned
 
 SETTINGS_FILE = "config/dr_eureka_main.yaml"
 _SMALLEST_PICTURE_PX = 32
@@ -43,7 +43,8 @@ class CardSettings:
     finder: FinderSettings
     ball_confidence: float = field(metadata={"min": 0.0, "max": 1.0})  # from here on a ball or foot counts
     doubt_confidence: float = field(metadata={"min": 0.0, "max": 1.0})  # from here on it makes a card doubtful
-    looks: int = field(metadata={"min": 2, "max": 20})  # most looks at one card; two must be read and agree
+    sure_confidence: float = field(metadata={"min": 0.0, "max": 1.0})  # of all balls and feet: one look is enough
+    looks: int = field(metadata={"min": 2, "max": 20})  # most looks at one card, else; two must be read and agree
     longest_side_px: int = field(metadata={"min": 320, "max": 8000})  # larger pictures are shrunk to this
     threads: int = field(metadata={"min": 1, "max": 64})
 
@@ -59,7 +60,7 @@ class CardReading:
 
     result: a CardResult; state: like RR|GG|PP when OK, else None; confidence: of the least sure ball, 0..1; reason: why
     not OK, else empty; corners (4, 2): the card's in the picture [px], clockwise from its printed upper left when OK,
-    from any otherwise; balls: as detected, in fractions of the rectified crop.
+    from any otherwise; balls: in fractions of the rectified crop whose corners these are.
     """
 
     result: str
@@ -78,11 +79,13 @@ class _Look:
     ground: np.ndarray
     layout: CardLayout | None
     reason: str
+    beyond_doubt: bool = False
 
     @property
     def looks_like_a_card(self) -> bool:
+        # Bars on a screen may pass for balls, but they stand on no feet.
         balls, feet = len(self.seen.balls), len(self.seen.feet)
-        return balls >= 3 or (balls >= 1 and feet >= 2)
+        return balls >= 5 or (balls >= 3 and feet >= 1) or (balls >= 1 and feet >= 2)
 
 
 class CardReader:
@@ -133,13 +136,14 @@ class CardReader:
     def _look(self, image_rgb: np.ndarray, members: list[Candidate]) -> list[_Look]:
         """Look at one possible card, by one outline after another and both ways up, until two looks could be read.
 
-        Upside down the network sees another picture and errs in other ways: two looks that agree are seldom both wrong.
+        A first look beyond doubt is enough. Upside down the network sees another picture and errs in other ways: two looks
+        that agree are seldom both wrong.
         """
         looks: list[_Look] = []
         for ground in (np.roll(member.ground, half, 0) for member in members for half in (0, 2)):
             looks.append(self._look_once(image_rgb, ground))
             read = sum(look.layout is not None for look in looks)
-            if read == 2 or len(looks) == self._settings.looks or not looks[-1].looks_like_a_card:
+            if looks[0].beyond_doubt or read == 2 or len(looks) == self._settings.looks or not looks[-1].looks_like_a_card:
                 break
         return looks
 
@@ -154,10 +158,12 @@ class CardReader:
             layout = read_layout(self._sure(seen))
         except LayoutError as error:
             return _Look(seen, ground, None, str(error))
-        odd = odd_ball(crop, seen.balls)
-        if odd is not None:
-            return _Look(seen, ground, None, f"a ball taken for {COLOUR_NAMES[odd.colour]} looks unlike the other one")
-        return _Look(seen, ground, layout, "")
+        ball, oddity = oddest_ball(crop, seen.balls)
+        if oddity > ODD:
+            return _Look(seen, ground, None, f"a ball taken for {COLOUR_NAMES[ball.colour]} looks unlike the other one")
+        # Six balls and three feet were sure to be there and nothing else was seen, not even faintly.
+        sure = all(thing.confidence >= self._settings.sure_confidence for thing in seen.balls + seen.feet)
+        return _Look(seen, ground, layout, "", beyond_doubt=sure and len(seen.feet) == 3 and oddity <= PLAIN)
 
     def _sure(self, seen: CropDetections) -> CropDetections:
         """Return the detections that count. Raises LayoutError when a ball is neither sure nor absent."""
@@ -168,19 +174,20 @@ class CardReader:
         return CropDetections(seen.balls, feet)
 
     def _verdict(self, looks: list[_Look], shrink: float) -> CardReading:
-        """Return OK when two looks were read and agree, else UNREADABLE."""
+        """Return OK for a look beyond doubt or two that were read and agree, else UNREADABLE."""
         read = [look for look in looks if look.layout]
         last = read[-1] if read else looks[-1]
         corners = _outer_corners(last.ground) / shrink
         states = list(dict.fromkeys(str(look.layout.state) for look in read))
-        if len(read) < 2:
+        if len(read) < 2 and not looks[0].beyond_doubt:
             reason = next(look.reason for look in looks if look.reason)
         elif len(states) > 1:
             reason = f"two looks disagree: {' and '.join(states)}"
         else:
             confidence = min(ball.confidence for look in read for ball in look.seen.balls)
             corners = np.roll(corners, last.layout.turn, 0)
-            return CardReading(CardResult.OK, states[0], confidence, "", corners, last.seen.balls)
+            balls = tuple(turned(ball, last.layout.turn) for ball in last.seen.balls)
+            return CardReading(CardResult.OK, states[0], confidence, "", corners, balls)
         return CardReading(CardResult.UNREADABLE, reason=reason, corners=corners, balls=last.seen.balls)
 
 

@@ -1,0 +1,159 @@
+"""Mean average precision of both card detectors on cards drawn as none of their training was (paper section 4.1).
+
+The crops are cut out as the finder cuts them, from cards of the look `held_out` in HELD_OUT_VIEWS: two figures of each
+drawing outside training's range, and one of size, tilt, light, motion blur, noise and compression outside of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dr_eureka.bench.cards_states import STATES
+from dr_eureka.bench.report import Row, progress
+from dr_eureka.game.state import COLOUR_NAMES, COLOURS
+from dr_eureka.vision.card_detections import CropDetections, collect
+from dr_eureka.vision.card_metrics import box_overlap
+from dr_eureka.vision.card_renderer import draw_card
+from dr_eureka.vision.card_scenes import rectified_sample
+from dr_eureka.vision.card_style import sample_style
+from dr_eureka.vision.card_views import HELD_OUT_VIEWS
+
+if TYPE_CHECKING:
+    from dr_eureka.vision.card_network import CardNetwork
+
+CROPS = 1000
+LEAST_MAP, MOST_BEHIND = 0.99, 0.005
+OVERLAP = 0.5  # of boxes, from which on a ball counts as found
+TITLES = {"eureka": "YOLO-Dr. Eureka", "tiny": "YOLOv2-tiny"}
+_PAPER_MAP = 0.952
+_LEAST_CONFIDENCE = 0.05
+_TEXTURE_PX = 256
+_RESAMPLINGS = 1000
+_CROPS, _BOOTSTRAP = 100, 101  # what random numbers are for: each use has its own
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A held-out crop (416, 416, 3) uint8 RGB; balls (6, 4): x, y, diameter as shares of the crop, and the class index."""
+
+    image: np.ndarray
+    balls: np.ndarray
+
+
+@dataclass(frozen=True)
+class Match:
+    """A ball as detected: in which crop, how sure, and whether it is one that is there."""
+
+    crop: int
+    confidence: float
+    hit: bool
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What is on the held-out crops, balls (6, 4) of each as in Crop, and what each network sees there."""
+
+    truth: list[np.ndarray]
+    seen: dict[str, list[CropDetections]]
+
+
+def held_out_crop(seed: int, index: int) -> Crop:
+    """Return one crop of a random state; the same for the same seed and index."""
+    rng = np.random.default_rng((seed, _CROPS, index))
+    state = STATES[rng.integers(len(STATES))]
+    drawing = draw_card(state, rng, _TEXTURE_PX, sample_style(rng, "held_out"))
+    image, balls, _ = rectified_sample(drawing, rng, HELD_OUT_VIEWS)
+    return Crop(image, balls)
+
+
+def detect_held_out(networks: Mapping[str, CardNetwork], seed: int, count: int) -> HeldOut:
+    """Return what networks see on so many crops, from a confidence on that is low enough for mAP."""
+    found = HeldOut([], {model: [] for model in networks})
+    for index in progress(range(count), count, "held-out crops"):
+        crop = held_out_crop(seed, index)
+        found.truth.append(crop.balls)
+        for model, network in networks.items():
+            grid = network.detect(crop.image)
+            arrays = (a[0].numpy() for a in (grid.balls, grid.diameters, grid.class_scores, grid.feet))
+            found.seen[model].append(collect(*arrays, threshold=_LEAST_CONFIDENCE))
+    return found
+
+
+def map_rows(found: HeldOut, seed: int) -> list[Row]:
+    """Return mAP@0.5 of each colour and their mean for each network, and how far ours is behind.
+
+    Intervals: bootstrap over crops, both networks on the same ones. A network that was not there has no value.
+    """
+    rows, draws, figures, n = [], {}, {}, len(found.truth)
+    weights = np.random.default_rng((seed, _BOOTSTRAP)).multinomial(n, np.full(n, 1 / n), _RESAMPLINGS)
+    for model in TITLES:
+        if model not in found.seen:
+            rows.append(Row(f"mAP@0.5, {TITLES[model]} (no weights shipped)", None, "share", goal=f">= {LEAST_MAP}"))
+            continue
+        by_colour = []
+        for colour in COLOURS:
+            matches, total = match_balls(found.truth, found.seen[model], colour)
+            drawn = np.array([weighted_precision(matches, total, w) for w in weights])
+            by_colour.append((weighted_precision(matches, total, np.ones(n, int)), drawn))
+            rows.append(_map_row(f"AP@0.5 {COLOUR_NAMES[colour]}, {TITLES[model]}", *by_colour[-1], n))
+        figures[model] = float(np.mean([value for value, _ in by_colour]))
+        draws[model] = np.mean([drawn for _, drawn in by_colour], axis=0)
+        rows.append(_map_row(f"mAP@0.5, {TITLES[model]}", figures[model], draws[model], n, paper=_PAPER_MAP))
+    goal = f">= -{MOST_BEHIND}"
+    if set(figures) == {"eureka", "tiny"}:
+        ahead = figures["eureka"] - figures["tiny"]
+        interval = _interval(draws["eureka"] - draws["tiny"])
+        met = ahead >= -MOST_BEHIND
+        rows.append(Row("mAP@0.5, ours less YOLOv2-tiny", ahead, "share", n, interval, 0.0, goal, met))
+    else:
+        rows.append(Row("mAP@0.5, ours less YOLOv2-tiny (no weights shipped)", None, "share", goal=goal))
+    return rows
+
+
+def match_balls(
+    truth: Sequence[np.ndarray], seen: Sequence[CropDetections], colour: str
+) -> tuple[list[Match], np.ndarray]:
+    """Return the detections of one colour, the surest first, and how many such balls each crop has (n,).
+
+    As in average_precision: each detection takes the ball that it overlaps most, if no surer one has.
+    """
+    matches, total = [], np.zeros(len(truth), int)
+    for index, (balls, found) in enumerate(zip(truth, seen)):
+        wanted = balls[balls[:, 3] == COLOURS.index(colour)]
+        total[index] = len(wanted)
+        taken: set[int] = set()
+        for ball in sorted((b for b in found.balls if b.colour == colour), key=lambda b: -b.confidence):
+            overlaps = [box_overlap((ball.x, ball.y, ball.diameter), box[:3]) for box in wanted]
+            best = int(np.argmax(overlaps)) if overlaps else -1
+            hit = best >= 0 and overlaps[best] >= OVERLAP and best not in taken
+            taken |= {best} if hit else set()
+            matches.append(Match(index, ball.confidence, hit))
+    return sorted(matches, key=lambda match: -match.confidence), total
+
+
+def weighted_precision(matches: Sequence[Match], total: np.ndarray, weights: np.ndarray) -> float:
+    """Return the average precision when each crop counts so many times; with all ones that of the crops as they are.
+
+    matches: the surest first; total, weights: (n,) balls of the colour in each crop, and how often it counts.
+    """
+    if not matches:
+        return 0.0
+    times = weights[[match.crop for match in matches]]
+    hits = np.cumsum(times * [match.hit for match in matches])
+    precision = hits / np.maximum(np.cumsum(times), 1)
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    recall = np.concatenate(([0.0], hits / (total @ weights)))
+    return float(np.sum(np.diff(recall) * envelope))
+
+
+def _map_row(name: str, value: float, drawn: np.ndarray, n: int, paper: float | None = None) -> Row:
+    return Row(name, value, "share", n, _interval(drawn), paper, f">= {LEAST_MAP}", value >= LEAST_MAP)
+
+
+def _interval(drawn: np.ndarray) -> tuple[float, float]:
+    low, high = np.percentile(drawn, (2.5, 97.5))
+    return float(low), float(high)
