@@ -4,7 +4,11 @@ import pytest
 from dr_eureka.game.actions import Action, actions_for, separate_actions, without_regrasps
 from dr_eureka.game.hands import EMPTY_GRIP, Grip, ReachError, grip_for, handling_between
 from dr_eureka.game.planner import plan_pours
+from dr_eureka.game.planner_settings import load_planner_settings
 from dr_eureka.game.state import START, Pour, State, all_states
+
+
+REACH = load_planner_settings().reach
 
 
 def play_out(actions, start):
@@ -47,7 +51,7 @@ def test_the_actions_of_every_plan_can_be_carried_out_and_reach_the_goal(make):
     ],
 )
 def test_the_left_hand_holds_the_tube_further_left(pour, grip):
-    assert grip_for(pour) == grip
+    assert grip_for(pour, REACH) == grip
 
 
 def test_crossed_hands_are_taken_only_when_reach_leaves_no_other_choice():
@@ -61,7 +65,7 @@ def test_a_pair_out_of_reach_is_named():
     with pytest.raises(ReachError) as caught:
         actions_for([Pour("left", "right")], reach={"left": ("left", "center"), "right": ("center",)})
     assert str(caught.value) == (
-        "pour left to right, count 1: the hands cannot take these two tubes, "
+        "pour left to right, count 1: the hands cannot take the tubes for this, "
         "they reach left hand: left, center; right hand: center"
     )
 
@@ -111,7 +115,7 @@ def test_a_place_is_kept_when_another_hand_or_tube_follows():
 def test_handling_between_grips_counts_what_the_actions_count():
     for goal in all_states()[::50]:
         pours = plan_pours(START, goal)
-        grips = [EMPTY_GRIP, *map(grip_for, pours), EMPTY_GRIP]
+        grips = [EMPTY_GRIP, *(grip_for(pour, REACH) for pour in pours), EMPTY_GRIP]
         expected = sum(action.kind != "pour" for action in actions_for(pours))
         assert sum(map(handling_between, grips, grips[1:])) == expected
 
@@ -121,7 +125,7 @@ def test_no_pours_need_no_actions():
 
 
 def test_the_grip_tells_which_hand_has_a_tube():
-    assert grip_for(Pour("left", "center")).hand_with("center") == "right"
+    assert grip_for(Pour("left", "center"), REACH).hand_with("center") == "right"
 
 
 def test_a_state_of_another_start_can_be_reached_too():

@@ -9,7 +9,7 @@ import pytest
 
 from dr_eureka.cli.plan_game import main
 from dr_eureka.game.actions import actions_for
-from dr_eureka.game.planner import plan_pours
+from dr_eureka.game.planner import Planner, plan_pours
 from dr_eureka.game.state import START, State
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -69,8 +69,9 @@ def test_a_goal_that_is_the_start_is_a_plan_of_no_pours(capsys):
 
 def test_the_printed_plan_draws_the_tubes_after_each_pour(capsys):
     assert main(["RR|G|PPG"]) == 0
-    assert capsys.readouterr().out == """\
-RR|GG|PP to RR|G|PPG: 1 pour, 4 picks and places
+    seconds = Planner().plan(START, State.parse("RR|G|PPG")).seconds
+    assert capsys.readouterr().out == f"""\
+RR|GG|PP to RR|G|PPG: 1 pour, 4 picks and places, about {seconds:.0f} s
 
   |   |    |   |    |   |
   |   |    |   |    |   |
@@ -93,6 +94,34 @@ RR|GG|PP to RR|G|PPG: 1 pour, 4 picks and places
   4. place the center tube with the left hand
   5. place the right tube with the right hand
 """
+
+
+def test_the_fastest_plan_pours_several_balls_at_once(capsys):
+    assert main(["RRPP|GG|", "--strategy", "fastest", "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["pours"] == [{"source": "right", "target": "left", "count": 2}]
+    assert (plan["strategy"], plan["unit"], plan["cost"]) == ("fastest", "s", plan["seconds"])
+
+
+def test_the_surest_plan_says_what_to_do_when_a_pour_goes_wrong(capsys):
+    arguments = ["RRP|PG|G", "--strategy", "surest", "--pour", "direct"]
+    assert main([*arguments, "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert 0.9 < plan["chance"] < 1.0
+    assert len(plan["otherwise"]) == len(plan["pours"])
+    wrong = [result for results in plan["otherwise"] for result in results]
+    assert all(result["pour"] for result in wrong if result["state"] not in (None, "RRP|PG|G"))
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert f"Solved {plan['chance']:.1%} of the time" in text
+    assert text.count("of the time a ball is lost") == sum(result["state"] is None for result in wrong)
+
+
+def test_an_unknown_strategy_is_refused_with_those_there_are(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["RR|GG|PP", "--strategy", "nicest"])
+    assert caught.value.code == 2
+    assert "fewest" in capsys.readouterr().err
 
 
 def test_a_missing_goal_is_refused(capsys):

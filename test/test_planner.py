@@ -1,4 +1,4 @@
-"""Plans against a breadth-first search written for this test and the figures published for the puzzle.
+"""Plans of fewest pours against a breadth-first search written for this test and the figures published for the puzzle.
 
 The figures come from an independent solver: distances from RR|GG|PP and pick/place actions left after cancelling.
 """
@@ -130,15 +130,16 @@ def test_the_same_plan_comes_out_every_time():
     assert plan_pours(START, goal) == plan_pours(START, goal)
 
 
-def test_hands_that_cannot_take_two_tubes_cannot_play():
+def test_hands_that_cannot_take_two_tubes_cannot_play(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     with pytest.raises(ReachError, match="left hand: left; right hand: none"):
         plan_pours(START, State.parse("RRG|G|PP"), reach={"left": ("left",)})
 
 
-def test_a_plan_takes_less_than_a_tenth_of_a_second():
-    goals = all_states()[::171]
+def test_a_plan_takes_less_than_a_millisecond():
+    goals = all_states()[::17]
     plan_pours(START, START)
     began = time.process_time()
     for goal in goals:
         plan_pours(START, goal)
-    assert (time.process_time() - began) / len(goals) < 0.1
+    assert (time.process_time() - began) / len(goals) < 0.001

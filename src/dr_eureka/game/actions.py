@@ -5,7 +5,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Optional
 
-from dr_eureka.game.hands import DEFAULT_REACH, HANDS, Reach, grip_for
+from dr_eureka.game.hands import HANDS, Reach, grip_for
+from dr_eureka.game.planner_settings import load_planner_settings
 from dr_eureka.game.state import Pour
 
 
@@ -33,10 +34,11 @@ class Action:
         return f"{self.kind} the {self.tube} tube with the {self.hand} hand"
 
 
-def actions_for(pours: Iterable[Pour], reach: Reach = DEFAULT_REACH) -> tuple[Action, ...]:
+def actions_for(pours: Iterable[Pour], reach: Optional[Reach] = None) -> tuple[Action, ...]:
     """List the actions that carry out the pours and leave every tube on the table.
 
-    A tube that the same hand needs for the following pour stays in that hand.
+    A tube that the same hand needs for the following pour stays in that hand. `reach` is the robot's own by default,
+    as config/planner.yaml tells it.
 
     Raises:
         ReachError: when the hands cannot take the two tubes of a pour.
@@ -44,12 +46,13 @@ def actions_for(pours: Iterable[Pour], reach: Reach = DEFAULT_REACH) -> tuple[Ac
     return without_regrasps(separate_actions(pours, reach))
 
 
-def separate_actions(pours: Iterable[Pour], reach: Reach = DEFAULT_REACH) -> tuple[Action, ...]:
+def separate_actions(pours: Iterable[Pour], reach: Optional[Reach] = None) -> tuple[Action, ...]:
     """List the actions when every pour picks both its tubes and places them again.
 
     Raises:
         ReachError: when the hands cannot take the two tubes of a pour.
     """
+    reach = load_planner_settings().reach if reach is None else reach
     actions: list[Action] = []
     for pour in pours:
         grip = grip_for(pour, reach)

@@ -15,17 +15,15 @@ DEFAULT_REACH: Reach = {"left": ("left", "center"), "right": ("center", "right")
 
 
 class ReachError(DrEurekaError):
-    """A pour between two tubes that no pair of hands can take.
+    """Something to pour between tubes that no pair of hands can take.
 
     Attributes:
-        pour: the pour.
         reach: the tubes each hand can take.
     """
 
-    def __init__(self, pour: Pour, reach: Reach) -> None:
+    def __init__(self, what: object, reach: Reach) -> None:
         tubes = "; ".join(f"{hand} hand: {', '.join(reach.get(hand, ())) or 'none'}" for hand in HANDS)
-        super().__init__(f"pour {pour}: the hands cannot take these two tubes, they reach {tubes}")
-        self.pour = pour
+        super().__init__(f"{what}: the hands cannot take the tubes for this, they reach {tubes}")
         self.reach = reach
 
 
@@ -43,7 +41,7 @@ class Grip(NamedTuple):
 EMPTY_GRIP = Grip(None, None)
 
 
-def grip_for(pour: Pour, reach: Reach = DEFAULT_REACH) -> Grip:
+def grip_for(pour: Pour, reach: Reach) -> Grip:
     """Choose the hands for the two tubes of a pour.
 
     Where both hands could take both tubes, the arms stay uncrossed: the left hand takes the tube further left.
@@ -55,7 +53,7 @@ def grip_for(pour: Pour, reach: Reach = DEFAULT_REACH) -> Grip:
     for grip in (Grip(outer_left, outer_right), Grip(outer_right, outer_left)):
         if all(tube in reach.get(hand, ()) for hand, tube in zip(HANDS, grip)):
             return grip
-    raise ReachError(pour, reach)
+    raise ReachError(f"pour {pour}", reach)
 
 
 def handling_between(before: Grip, after: Grip) -> int:

@@ -1,62 +1,192 @@
-"""Shortest plans: Dijkstra's algorithm on the graph of all states (paper, section 3.3)."""
+"""Plans: which pours lead from a state to a goal, best by one of three strategies (paper, section 3.3)."""
 from __future__ import annotations
 
-import heapq
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple, Optional
 
-from dr_eureka.game.hands import DEFAULT_REACH, EMPTY_GRIP, Grip, Reach, grip_for, handling_between
-from dr_eureka.game.state import Pour, State, all_states
+import numpy as np
+
+from dr_eureka.game import pricing, solving, state_graph
+from dr_eureka.game.hands import Reach, ReachError
+from dr_eureka.game.planner_settings import PlannerError, PlannerSettings, load_planner_settings
+from dr_eureka.game.solving import NO_POUR, Prices, Shares, Solution
+from dr_eureka.game.state import TUBE_CAPACITY, Pour, State
+from dr_eureka.game.state_graph import POUR_NUMBERS, POURS
+from dr_eureka.game.tables import cache_folder, load_or_make, table_key
+
+STRATEGIES = ("fewest", "fastest", "surest")
 
 
-def plan_pours(start: State, goal: State, reach: Reach = DEFAULT_REACH) -> tuple[Pour, ...]:
-    """Find the pours that lead from one state to another with the fewest balls moved.
+@dataclass(frozen=True)
+class Plan:
+    """Pours from a state to a goal, none where they are alike.
 
-    Each pour moves one ball and costs 1, as in the paper. Among the equally short plans (up to 16) this is one with
-    the fewest picks and places, which depend on how often the hands can keep their tubes between two pours.
-    The choice is exact, and the same plan comes out every time. Start and goal alike need no pour.
+    Attributes:
+        cost: what the strategy makes least: balls poured (`fewest`) or seconds (`fastest`; `surest`: to be expected).
+        seconds: predicted duration [s] when every pour does what it should, without looks.
+        chance: of reaching the goal if after each pour what results is looked at; None but for `surest`.
+    """
+
+    start: State
+    goal: State
+    strategy: str
+    pours: tuple[Pour, ...]
+    cost: float
+    seconds: float
+    chance: Optional[float] = None
+
+
+class Result(NamedTuple):
+    """What a pour may end in: its share of all such pours, the state, and what to pour then.
+
+    `state` is None when a ball is lost; `pour` is None then and at the goal.
+    """
+
+    share: float
+    state: Optional[State]
+    pour: Optional[Pour]
+
+
+class Planner:
+    """Answers from tables of all 1710 x 1710 cards, made once (a few seconds) and kept in the user's cache folder.
+
+    * `fewest`: one ball a pour, as few pours as possible, then as few picks and places (the paper, and its section 3.5).
+    * `fastest`: as few seconds as possible, any count of balls a pour.
+    * `surest`: the greatest chance to reach the goal when pours may go wrong, then as few expected seconds.
+    """
+
+    def __init__(
+        self,
+        strategy: str = "fewest",
+        method: str = "lock",
+        settings: Optional[PlannerSettings] = None,
+        cache: Optional[Path] = None,
+    ):
+        """Load or make the tables; `settings` are config/planner.yaml and `cache` is `cache_folder()` by default.
+
+        Raises:
+            PlannerError: for an unknown strategy or way to pour.
+        """
+        self._settings = settings or load_planner_settings()
+        _expect("strategy", strategy, STRATEGIES)
+        _expect("way to pour", method, self._settings.methods)
+        self.strategy = strategy
+        self._method = method
+        self.reach: Reach = self._settings.reach
+        self._seconds = pricing.duration_prices(self._settings, method)
+        self._graph = state_graph.state_graph()
+        prices = pricing.fewest_prices(self.reach) if strategy == "fewest" else self._seconds
+        shares = pricing.outcome_shares(self._settings, method) if strategy == "surest" else None
+        self._solution = _solution(prices, shares, cache or cache_folder())
+
+    def plan(self, start: State, goal: State) -> Plan:
+        """Return the best plan if every pour does what it should; where one does not, plan again from what resulted.
+
+        Raises:
+            ReachError: when the hands cannot take the tubes that lead to the goal.
+            PlannerError: when pours that do what they should never get there, so odd are the outcomes in the settings.
+        """
+        numbers = self._numbers(start, goal)
+        cost, chance = len(numbers), None
+        if self.strategy != "fewest":
+            cost = self._solution.cost[self._look_up(start, goal)]
+        if self._solution.chance is not None:
+            chance = float(self._solution.chance[self._look_up(start, goal)])
+        seconds = pricing.price_of(numbers, self._seconds)
+        return Plan(start, goal, self.strategy, tuple(POURS[number] for number in numbers), float(cost), seconds, chance)
+
+    def pours(self, start: State, goal: State) -> tuple[Pour, ...]:
+        """Return the pours of the best plan alone; raises what `plan` does."""
+        return tuple(POURS[number] for number in self._numbers(start, goal))
+
+    def _numbers(self, start: State, goal: State) -> list[int]:
+        """Return the pours of the best plan by their numbers in `POURS`."""
+        goal_class, state = self._look_up(start, goal)
+        if self._solution.cost.item(goal_class, state) >= solving.UNREACHABLE:
+            raise ReachError(f"{start} to {goal}", self.reach)
+        next_pour, after = self._solution.pour[goal_class], self._graph.after
+        numbers: list[int] = []
+        held = 0
+        while (pour := next_pour.item(held, state)) != NO_POUR:
+            numbers.append(pour)
+            direction, fewer = divmod(pour, TUBE_CAPACITY)
+            state, held = after.item(direction, fewer + 1, state), direction + 1
+            if len(numbers) > len(POURS) * TUBE_CAPACITY:
+                raise PlannerError(f"{start} to {goal}: the {self.strategy} way counts on pours that go wrong")
+        return numbers
+
+    def next_pour(self, state: State, goal: State, last: Optional[Pour] = None) -> Optional[Pour]:
+        """Return what to pour next, None at the goal, from whatever state has resulted.
+
+        `last` is the pour just made when its tubes are still in the hands, None for empty hands.
+
+        Raises:
+            ReachError: when the hands cannot take the tubes that lead to the goal.
+        """
+        goal_class, number = self._look_up(state, goal)
+        held = 0 if last is None else POUR_NUMBERS[last] // TUBE_CAPACITY + 1
+        pour = self._solution.pour.item(goal_class, held, number)
+        if pour == NO_POUR and state != goal:
+            raise ReachError(f"{state} to {goal}", self.reach)
+        return None if pour == NO_POUR else POURS[pour]
+
+    def results_of(self, pour: Pour, state: State, goal: State) -> tuple[Result, ...]:
+        """Return how a pour from a state may end other than as intended, likeliest first, and what to pour then.
+
+        Raises:
+            PourError: for a pour that the state does not allow.
+        """
+        state.after(pour)
+        outcome = self._settings.outcomes[self._method][len(state.tube(pour.source))][pour.count]
+        fewer = state if pour.count == 1 else state.after(replace(pour, count=pour.count - 1))
+        shares, lost = {fewer: outcome.fewer}, outcome.lost
+        if len(state.tube(pour.target)) + pour.count < TUBE_CAPACITY and outcome.more:
+            shares[state.after(replace(pour, count=pour.count + 1))] = outcome.more
+        else:
+            lost += outcome.more
+        found = [Result(share, other, self.next_pour(other, goal, last=pour)) for other, share in shares.items() if share]
+        found += [Result(lost, None, None)] if lost else []
+        return tuple(sorted(found, key=lambda result: -result.share))
+
+    def _look_up(self, state: State, goal: State) -> tuple[int, int]:
+        """Return by which class and state the tables know a goal and a state, colours swapped as in the class's goal."""
+        graph = self._graph
+        goal_number = graph.numbers[goal]
+        swap = graph.recolouring.item(goal_number)
+        return graph.goal_class.item(goal_number), graph.recoloured.item(swap, graph.numbers[state])
+
+
+def plan_pours(start: State, goal: State, reach: Optional[Reach] = None) -> tuple[Pour, ...]:
+    """Return the pours of the `fewest` plan: as few balls as possible, one a pour, then as few picks and places.
+
+    `reach` is the robot's own by default, as config/planner.yaml tells it.
 
     Raises:
-        ReachError: when the hands cannot take both tubes of a pour that a shortest plan may contain.
+        ReachError: when the hands cannot take the tubes that lead to the goal.
     """
-    balls_moved = _balls_from(start)
-
-    @lru_cache(maxsize=None)
-    def cheapest_way(state: State, grip: Grip) -> tuple[int, tuple[Pour, ...]]:
-        """Return the fewest picks and places, and the pours, from the start to `state` and then to holding `grip`."""
-        if state == start:
-            return handling_between(EMPTY_GRIP, grip), ()
-        ways = []
-        for pour_back, previous in _edges()[state]:
-            if balls_moved[previous] >= balls_moved[state]:
-                continue
-            pour = Pour(pour_back.target, pour_back.source)
-            pour_grip = grip_for(pour, reach)
-            handling, pours = cheapest_way(previous, pour_grip)
-            ways.append((handling + handling_between(pour_grip, grip), (*pours, pour)))
-        return min(ways)
-
-    return cheapest_way(goal, EMPTY_GRIP)[1]
+    return _fewest(None if reach is None else tuple(sorted(reach.items()))).pours(start, goal)
 
 
-@lru_cache(maxsize=1)
-def _edges() -> dict[State, tuple[tuple[Pour, State], ...]]:
-    """Return the pours of one ball from each state with the states they lead to; each can be poured back."""
-    return {state: tuple((pour, state.after(pour)) for pour in state.legal_pours()) for state in all_states()}
+@lru_cache(maxsize=4)
+def _fewest(reach: Optional[tuple[tuple[str, tuple[str, ...]], ...]]) -> Planner:
+    settings = load_planner_settings()
+    return Planner("fewest", settings=settings if reach is None else replace(settings, reach=dict(reach)))
 
 
-@lru_cache(maxsize=16)
-def _balls_from(start: State) -> dict[State, int]:
-    """Return for each state how many balls a shortest plan from `start` moves, by Dijkstra's algorithm."""
-    edges = _edges()
-    distances = {start: 0}
-    frontier = [(0, start)]
-    while frontier:
-        distance, state = heapq.heappop(frontier)
-        if distance > distances[state]:
-            continue
-        for pour, neighbour in edges[state]:
-            through = distance + pour.count
-            if through < distances.get(neighbour, through + 1):
-                distances[neighbour] = through
-                heapq.heappush(frontier, (through, neighbour))
-    return distances
+def _solution(prices: Prices, shares: Optional[Shares], folder: Optional[Path]) -> Solution:
+    """Return the tables for prices and shares, from the cache folder if the same code has made them there before."""
+    arrays = [getattr(part, field.name) for part in (prices, shares) if part is not None for field in fields(part)]
+    code = [Path(module.__file__).read_bytes() for module in (solving, state_graph)]
+
+    def make() -> dict[str, np.ndarray]:
+        solution = vars(solving.solve(state_graph.state_graph(), prices, shares))
+        return {name: array for name, array in solution.items() if array is not None}
+
+    return Solution(**{"chance": None, **load_or_make(f"plans-{table_key(*arrays, *code)}", make, folder)})
+
+
+def _expect(what: str, word: str, known: tuple[str, ...]) -> None:
+    if word not in known:
+        raise PlannerError(f"{what} {word!r}, expected one of {', '.join(known)}")
