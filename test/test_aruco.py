@@ -2,7 +2,14 @@ import cv2
 import numpy as np
 import pytest
 
-from dr_eureka.vision.aruco import ArucoError, detect_markers, find_markers, marker_image
+from dr_eureka.vision.aruco import (
+    ArucoError,
+    detect_markers,
+    find_charuco_corners,
+    find_markers,
+    marker_image,
+    module_rectangles,
+)
 
 DICTIONARY = "DICT_4X4_1000"
 
@@ -69,3 +76,29 @@ def test_an_unknown_dictionary_is_refused_with_the_valid_ones_named():
 def test_a_marker_that_cannot_be_drawn_is_refused(marker, side):
     with pytest.raises(ArucoError):
         marker_image(marker, side)
+
+
+def test_module_rectangles_draw_the_marker():
+    drawn = np.full((70, 70), 255, np.uint8)
+    for left, top, width, height in module_rectangles(11, 70.0, "DICT_5X5_50").astype(int):
+        drawn[top : top + height, left : left + width] = 0
+    assert np.array_equal(drawn, marker_image(11, 70, "DICT_5X5_50"))
+
+
+def test_a_charuco_board_without_any_marker_in_view_gives_no_corners():
+    ids, corners = find_charuco_corners(page(), (7, 5), 0.75, "DICT_5X5_50")
+    assert ids.shape == (0,) and corners.shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    "squares, share, dictionary, reason",
+    [
+        ((7, 4), 0.75, "DICT_5X5_50", "7x4 squares, expected .* an odd number of rows"),
+        ((7, 5), 1.0, "DICT_5X5_50", "1 times as wide as their squares"),
+        ((11, 11), 0.75, "DICT_5X5_50", "60 markers, expected at most the 50 of DICT_5X5_50"),
+        ((7, 5), 0.75, "DICT_9X9_1", "'DICT_9X9_1' is unknown"),
+    ],
+)
+def test_a_charuco_board_that_cannot_be_is_refused(squares, share, dictionary, reason):
+    with pytest.raises(ArucoError, match=reason):
+        find_charuco_corners(page(), squares, share, dictionary)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -43,11 +44,7 @@ def find_markers(image_grey: np.ndarray, dictionary: str) -> MarkerDetection:
     Raises:
         ArucoError: unknown dictionary, or a picture that is not a two-dimensional uint8 array.
     """
-    if not isinstance(image_grey, np.ndarray) or image_grey.ndim != 2 or image_grey.dtype != np.uint8:
-        shape, dtype = getattr(image_grey, "shape", None), getattr(image_grey, "dtype", type(image_grey).__name__)
-        raise ArucoError(f"marker picture has shape {shape} and type {dtype}, expected (height, width) uint8")
-    if image_grey.size == 0:
-        raise ArucoError(f"marker picture is empty: shape {image_grey.shape}")
+    _check_picture(image_grey)
     predefined = _predefined(dictionary)
     if hasattr(cv2.aruco, "ArucoDetector"):
         detector = cv2.aruco.ArucoDetector(predefined, _parameters(cv2.aruco.DetectorParameters()))
@@ -81,17 +78,116 @@ def marker_image(marker_id: int, side_px: int, dictionary: str = "DICT_4X4_1000"
     Raises:
         ArucoError: unknown dictionary, id outside of it, or a side below 1.
     """
+    if side_px < 1:
+        raise ArucoError(f"marker side is {side_px} px, expected at least 1")
+    picture = np.where(marker_modules(marker_id, dictionary), 0, 255).astype(np.uint8)
+    enlarged = np.kron(picture, np.ones((side_px, side_px), np.uint8))
+    return cv2.resize(enlarged, (side_px, side_px), interpolation=cv2.INTER_AREA)
+
+
+def marker_modules(marker_id: int, dictionary: str) -> np.ndarray:
+    """Return which modules of a marker are black, its border of one module included, as (side, side) bool, row 0 on top.
+
+    Raises:
+        ArucoError: unknown dictionary, or id outside of it.
+    """
     predefined = _predefined(dictionary)
     count = predefined.bytesList.shape[0]
     if not 0 <= marker_id < count:
         raise ArucoError(f"marker id {marker_id} is not in {dictionary}, expected 0..{count - 1}")
-    if side_px < 1:
-        raise ArucoError(f"marker side is {side_px} px, expected at least 1")
-    modules = predefined.markerSize + 2
     draw = getattr(cv2.aruco, "generateImageMarker", None) or cv2.aruco.drawMarker
-    picture = draw(predefined, marker_id, modules)
-    enlarged = np.kron(picture, np.ones((side_px, side_px), np.uint8))
-    return cv2.resize(enlarged, (side_px, side_px), interpolation=cv2.INTER_AREA)
+    return draw(predefined, marker_id, predefined.markerSize + 2) == 0
+
+
+def module_rectangles(marker: int, side: float, dictionary: str) -> np.ndarray:
+    """Return a marker's black modules, (n, 4) left, top, width, height from its top left corner, in the unit of `side`.
+
+    Raises:
+        ArucoError: unknown dictionary, or id outside of it.
+    """
+    modules = marker_modules(marker, dictionary)
+    size = side / len(modules)
+    rows, columns = np.nonzero(modules)
+    return np.column_stack([columns * size, rows * size, np.full((len(rows), 2), size)])
+
+
+def find_charuco_corners(
+    image_grey: np.ndarray, squares: tuple[int, int], marker_share: float, dictionary: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the inner chessboard corners of a ChArUco board, each known by the markers beside it.
+
+    Args:
+        image_grey: (height, width) uint8 picture.
+        squares: columns and rows of the board; its first square, top left, is black. Rows must be odd in number, since
+            OpenCV before and after 4.6 puts the first square of the others differently.
+        marker_share: side of a marker as a share of a square's, between 0 and 1.
+        dictionary: name of the predefined dictionary whose first markers fill the white squares row by row.
+
+    Returns:
+        Ids (n,) int, counted row by row from the top left, and sub-pixel positions (n, 2) float64 [px] (column, row).
+
+    Raises:
+        ArucoError: a board that cannot be, or a picture that is not a two-dimensional uint8 array.
+    """
+    _check_picture(image_grey)
+    columns, rows = squares
+    if columns < 2 or rows < 3 or rows % 2 == 0:
+        raise ArucoError(f"ChArUco board has {columns}x{rows} squares, expected at least 2x3 and an odd number of rows")
+    if not 0.0 < marker_share < 1.0:
+        raise ArucoError(f"markers are {marker_share:g} times as wide as their squares, expected between 0 and 1")
+    predefined = _predefined(dictionary)
+    markers, known = columns * rows // 2, predefined.bytesList.shape[0]
+    if markers > known:
+        raise ArucoError(f"ChArUco board has {markers} markers, expected at most the {known} of {dictionary}")
+    ids, corners = _detect_charuco(image_grey, squares, marker_share, predefined)
+    return ids, corners - _charuco_offset_px()
+
+
+def _detect_charuco(
+    image_grey: np.ndarray, squares: tuple[int, int], marker_share: float, predefined: cv2.aruco.Dictionary
+) -> tuple[np.ndarray, np.ndarray]:
+    ids = None
+    if hasattr(cv2.aruco, "CharucoDetector"):
+        board = cv2.aruco.CharucoBoard(squares, 1.0, marker_share, predefined)
+        corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(image_grey)
+    else:
+        board = cv2.aruco.CharucoBoard_create(*squares, 1.0, marker_share, predefined)
+        quads, seen, _ = cv2.aruco.detectMarkers(image_grey, predefined)
+        if seen is not None:
+            _, corners, ids = cv2.aruco.interpolateCornersCharuco(quads, seen, image_grey, board)
+    if ids is None:
+        return np.zeros(0, int), np.zeros((0, 2))
+    return np.ravel(ids).astype(int), np.asarray(corners, np.float64).reshape(-1, 2)
+
+
+@lru_cache(maxsize=1)
+def _charuco_offset_px() -> float:
+    """Return how far right and down of its true place this OpenCV puts ChArUco corners: half a pixel or nothing.
+
+    Half a pixel from 4.5.4 on until its issue 25539 was mended. Measured on a drawn board, since versions do not tell.
+    """
+    side, dictionary = 40, "DICT_4X4_50"
+    picture = np.full((5 * side, 5 * side), 255, np.uint8)
+    for index in range(9):
+        top, left = (1 + np.array(divmod(index, 3))) * side
+        # Squares are black and white in turn; every second one holds the next marker.
+        square = picture[top : top + side, left : left + side]
+        if index % 2 == 0:
+            square[:] = 0
+        else:
+            square[8:-8, 8:-8] = marker_image(index // 2, side - 16, dictionary)
+    ids, corners = _detect_charuco(picture, (3, 3), 1.0 - 16 / side, _predefined(dictionary))
+    # A pixel's coordinates are those of its centre, so that the edge before pixel n is at n - 0.5.
+    true = np.column_stack([ids % 2, ids // 2]) * side + 2 * side - 0.5
+    return float(np.rint(2 * np.mean(corners - true)) / 2)
+
+
+def _check_picture(image_grey: np.ndarray) -> None:
+    if not isinstance(image_grey, np.ndarray) or image_grey.ndim != 2 or image_grey.dtype != np.uint8:
+        shape, dtype = getattr(image_grey, "shape", None), getattr(image_grey, "dtype", type(image_grey).__name__)
+        raise ArucoError(f"marker picture has shape {shape} and type {dtype}, expected (height, width) uint8")
+    if image_grey.size == 0:
+        raise ArucoError(f"marker picture is empty: shape {image_grey.shape}")
 
 
 def _predefined(name: str):

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import yaml
 
 from dr_eureka.errors import DrEurekaError
+from dr_eureka.resources import load_yaml
 
 LAB_MATRIX = ((617.73492686, 0.0, 301.59321376), (0.0, 620.08687683, 238.79976856), (0.0, 0.0, 1.0))
 LAB_DISTORTION = (0.09185878, -0.06354207, 0.00779513, -0.00322328, -0.36163446)
+_DISTORTION_MODEL = "plumb_bob"
 
 
 class CameraError(DrEurekaError):
@@ -124,3 +129,55 @@ class CameraModel:
     def _undistortion_maps(self) -> tuple[np.ndarray, np.ndarray]:
         size = (self.width, self.height)
         return cv2.initUndistortRectifyMap(self.matrix, self.distortion, None, self.matrix, size, cv2.CV_32FC1)
+
+
+def save_camera(camera: CameraModel, path: str | Path, name: str = "camera") -> None:
+    """Write a calibration as the yaml that ROS's camera drivers read (package camera_calibration_parsers).
+
+    Rectified images keep the camera's own matrix, as those of `undistort` do.
+
+    Raises:
+        CameraError: the file cannot be written.
+    """
+    content = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "camera_name": name,
+        "camera_matrix": _as_mapping(camera.matrix),
+        "distortion_model": _DISTORTION_MODEL,
+        "distortion_coefficients": _as_mapping(camera.distortion[None]),
+        "rectification_matrix": _as_mapping(np.eye(3)),
+        "projection_matrix": _as_mapping(np.hstack([camera.matrix, np.zeros((3, 1))])),
+    }
+    try:
+        Path(path).write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=200), encoding="utf-8")
+    except OSError as error:
+        raise CameraError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def load_camera(path: str | Path) -> CameraModel:
+    """Load the calibration in a yaml of ROS's camera drivers (package camera_calibration_parsers).
+
+    Raises:
+        ResourceError: the file is missing or no yaml.
+        CameraError: naming the file and the key that is missing or wrong, such as another distortion model.
+    """
+    content = load_yaml(Path(path).absolute())
+    model = content.get("distortion_model", _DISTORTION_MODEL)
+    if model != _DISTORTION_MODEL:
+        raise CameraError(f"{path}: distortion_model is {model!r}, expected {_DISTORTION_MODEL!r}")
+    try:
+        size = int(content["image_width"]), int(content["image_height"])
+        matrix, distortion = (np.array(content[key]["data"], float) for key in ("camera_matrix", "distortion_coefficients"))
+    except KeyError as error:
+        raise CameraError(f"{path}: key {error} is missing, expected a camera_info yaml") from error
+    except (TypeError, ValueError) as error:
+        raise CameraError(f"{path}: holds something that is no number, expected a camera_info yaml: {error}") from error
+    try:
+        return CameraModel(*size, matrix, distortion)
+    except CameraError as error:
+        raise CameraError(f"{path}: {error}") from error
+
+
+def _as_mapping(matrix: np.ndarray) -> dict[str, Any]:
+    return {"rows": matrix.shape[0], "cols": matrix.shape[1], "data": matrix.ravel().tolist()}
