@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ from dr_eureka.pieces import load_pieces
 from dr_eureka.vision.aruco import marker_image
 from dr_eureka.vision.camera import CameraModel
 from dr_eureka.vision.tubes import NAMES, TubeResult, TubeSettings, locate_tubes
-from tube_scenes import Scene, draw, random_scene
+from tube_scenes import Scene, draw, draw_fallen_tube, random_scene
 
 CAMERA = CameraModel.lab()
 
@@ -42,14 +43,14 @@ def test_the_game_as_it_stands_at_the_start_is_located(pieces, settings):
 def test_tubes_anywhere_on_a_turned_sheet_are_within_a_millimetre_in_any_light(pieces, settings):
     rng = np.random.default_rng(11)
     errors = []
-    for _ in range(20):
+    for _ in range(10):
         scene = random_scene(rng, pieces)
         found = look(scene, pieces, settings)
         # A tube may stand right behind another and be missed; then nothing may be claimed.
-        assert found.result in (TubeResult.OK, TubeResult.TUBE_MISSING)
+        assert found.result in (TubeResult.OK, TubeResult.TUBE_MISSING, TubeResult.TUBE_HIDDEN)
         if found.result == TubeResult.OK:
             errors.extend(errors_mm(found, scene))
-    assert len(errors) >= 3 * 18
+    assert len(errors) >= 3 * 8
     assert np.mean(errors) < 0.4 and np.max(errors) < 1.5
 
 
@@ -112,7 +113,10 @@ def test_empty_and_full_tubes_are_located_alike(pieces, settings):
 def test_tubes_that_touch_are_told_apart(pieces, settings, offset):
     tubes = np.array([[-0.06, 0.0], np.add([-0.06, 0.0], offset), [-0.035, -0.11]])
     scene = Scene(tubes=tubes, balls=("", "GGR", "PP"))
-    assert errors_mm(look(scene, pieces, settings), scene).max() < 1.0
+    assert errors_mm(look(scene, pieces, replace(settings, smallest_gap_m=0.0)), scene).max() < 1.0
+    found = look(scene, pieces, settings)
+    assert (found.result, found.tubes) == (TubeResult.TUBES_TOUCHING, {})
+    assert re.fullmatch(r"feet of the \w+ and \w+ tube are \d\.\d mm apart, expected at least 5 mm", found.reason)
 
 
 def test_a_foot_half_hidden_by_the_balls_of_a_tube_in_front_is_located(pieces, settings):
@@ -142,9 +146,59 @@ def test_a_sheet_printed_mirrored_is_no_sheet(pieces, settings):
     assert (found.result, found.tubes) == (TubeResult.NO_SHEET, {})
 
 
-def test_a_sheet_of_another_dictionary_is_no_sheet(pieces, settings):
-    image = draw(Scene(), replace(pieces, marker_dictionary="DICT_5X5_100"), CAMERA)
-    assert locate_tubes(image, CAMERA, Scene().base_from_camera, pieces, settings).result == TubeResult.NO_SHEET
+@pytest.mark.parametrize("dictionary", ["DICT_5X5_100", "DICT_ARUCO_ORIGINAL"])
+def test_a_sheet_of_another_dictionary_is_named(pieces, settings, dictionary):
+    image = draw(Scene(), replace(pieces, marker_dictionary=dictionary), CAMERA)
+    found = locate_tubes(image, CAMERA, Scene().base_from_camera, pieces, settings)
+    assert (found.result, found.tubes, found.base_from_sheet) == (TubeResult.WRONG_DICTIONARY, {}, None)
+    assert dictionary.rpartition("_")[0] in found.reason and "expected DICT_4X4_1000" in found.reason
+
+
+def test_two_markers_seen_twice_leave_too_few_and_are_named(pieces, settings):
+    scene = Scene(tubes=np.array([[-0.06, 0.07], [-0.06, 0.0], [-0.06, -0.07]]))
+    image = draw(scene, pieces, CAMERA)
+    for marker, column in ((3, 380), (2, 220)):
+        image[380:460, column - 10 : column + 70] = 255
+        image[390:450, column : column + 60] = marker_image(marker, 60)[..., None]
+    found = locate_tubes(image, CAMERA, scene.base_from_camera, pieces, settings)
+    assert (found.result, found.tubes) == (TubeResult.DUPLICATE_MARKER, {})
+    assert "[2, 3] seen twice" in found.reason
+
+
+@pytest.mark.parametrize("turn", np.radians([-90, 25, 180]))
+def test_a_sheet_laid_down_at_any_turn_is_located(pieces, settings, turn):
+    scene = Scene(sheet=(0.48, 0.01, turn), tubes=np.array([[-0.05, 0.09], [0.03, 0.0], [0.0, -0.07]]), head_pitch=0.8)
+    found = look(scene, pieces, settings)
+    assert found.result == TubeResult.OK
+    assert errors_mm(found, scene).max() < 0.6
+
+
+def test_a_tube_beside_the_sheet_is_named(pieces, settings):
+    scene = Scene(tubes=np.array([[-0.035, 0.11], [-0.035, 0.0], [-0.153, -0.08]]))
+    found = look(scene, pieces, settings)
+    assert (found.result, found.tubes) == (TubeResult.TUBE_OFF_SHEET, {})
+    assert found.reason == "2 tube feet seen on the sheet, expected 3; 1 beside it"
+
+
+def test_a_hand_over_a_tube_hides_it(pieces, settings):
+    scene = Scene()
+    image = draw(scene, pieces, CAMERA)
+    foot = np.linalg.inv(scene.base_from_camera) @ [*scene.tubes_in_base[2], 1.0]
+    column, row = np.rint(CAMERA.project(foot[:3])).astype(int)
+    image[row - 40 : row + 20, column - 50 : column + 200] = (62, 64, 68)
+    found = locate_tubes(image, CAMERA, scene.base_from_camera, pieces, settings)
+    assert (found.result, found.tubes) == (TubeResult.TUBE_HIDDEN, {})
+    assert "covers the sheet" in found.reason
+
+
+@pytest.mark.parametrize("turn", np.radians([0, 100, 180, 300]))
+def test_a_fallen_tube_is_never_taken_for_a_standing_one(pieces, settings, turn):
+    scene = Scene(tubes=Scene().tubes[:2], balls=("RR", "GG"))
+    image = draw(scene, pieces, CAMERA)
+    draw_fallen_tube(image, scene, pieces, CAMERA, foot=(0.0, -0.06), heading=turn)
+    found = locate_tubes(image, CAMERA, scene.base_from_camera, pieces, settings)
+    assert found.tubes == {}
+    assert found.result in (TubeResult.TUBE_FALLEN, TubeResult.TUBE_HIDDEN)  # hidden if another tube is in front of it
 
 
 def test_a_head_that_nods_by_half_a_degree_is_corrected_from_the_sheets_perspective(pieces, settings):

@@ -98,6 +98,30 @@ def draw(scene: Scene, pieces: Pieces, camera: CameraModel) -> np.ndarray:
     return painter.picture()
 
 
+def draw_fallen_tube(
+    image: np.ndarray, scene: Scene, pieces: Pieces, camera: CameraModel, foot: tuple[float, float], heading: float
+) -> None:
+    """Draw an empty tube that lies on the sheet, its foot at `foot` in the sheet frame, its mouth toward `heading` [rad]."""
+    axis, across = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([-np.sin(heading), np.cos(heading), 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    camera_from_sheet = np.linalg.inv(scene.base_from_camera) @ scene.base_from_sheet
+    turn = np.linspace(0, 2 * np.pi, 60)[:, None]
+
+    def ring(along: float, radius: float) -> np.ndarray:
+        centre = np.array([*foot, pieces.foot_radius]) + along * axis
+        points = centre + radius * (np.cos(turn) * across + np.sin(turn) * up)
+        return camera.project(points @ camera_from_sheet[:3, :3].T + camera_from_sheet[:3, 3])
+
+    disc, tape, outer = pieces.foot_thickness, pieces.foot_thickness + pieces.tape_height, pieces.tube_outer_radius
+    parts = [((0.0, pieces.foot_radius), (disc, pieces.foot_radius), 1.0, TAPE), ((disc, outer), (tape, outer), 1.0, TAPE),
+             ((tape, outer), (pieces.tube_height, outer), 0.12, (200, 205, 210))]
+    for start, end, opacity, colour in parts:
+        hull = cv2.convexHull(np.concatenate([ring(*start), ring(*end)]).astype(np.float32))
+        layer = image.copy()
+        cv2.fillPoly(layer, [np.round(hull * 16).astype(np.int32)], colour, cv2.LINE_AA, 4)
+        cv2.addWeighted(layer, opacity, image, 1 - opacity, 0, dst=image)
+
+
 class _Painter:
     def __init__(self, scene: Scene, pieces: Pieces, camera: CameraModel):
         self.scene, self.pieces, self.camera = scene, pieces, camera

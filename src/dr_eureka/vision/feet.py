@@ -35,6 +35,7 @@ class FootSettings:
     smallest_step: float = field(metadata={"min": 0.01, "max": 1.0})
     edge_band_px: float = field(metadata={"min": 0.1})
     smallest_arc_share: float = field(metadata={"min": 0.05, "max": 1.0})
+    smallest_agreement: float = field(metadata={"min": 0.05, "max": 1.0})
     brightest_rim: float = field(metadata={"min": 0.01, "max": 1.0})
 
 
@@ -123,7 +124,8 @@ def _fit(
             break
     good = steps & (np.abs(errors - outward @ shift) < band)
     share = float(good.mean())
-    if share < settings.smallest_arc_share:
+    # The upright disc of a fallen tube has an outline all round, but not that of a circle on the paper.
+    if share < settings.smallest_arc_share or share < settings.smallest_agreement * steps.mean():
         return None
     # Between the edge's blur and the wall, the disc itself must be dark.
     depths = np.linspace(EDGE_REACH_PX, 0.8 * rim_px, 4)

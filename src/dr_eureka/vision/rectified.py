@@ -21,10 +21,12 @@ class SheetGrid:
     Args:
         pieces: sizes of the sheet [m].
         pixels_per_metre: resolution [px/m].
+        margin_m: width of the strip round the sheet that the picture shows, too [m].
     """
 
     pieces: Pieces
     pixels_per_metre: float
+    margin_m: float = 0.0
 
     @property
     def size(self) -> tuple[int, int]:
@@ -41,7 +43,7 @@ class SheetGrid:
 
     @property
     def _far_left(self) -> np.ndarray:
-        return np.array([self.pieces.sheet_width, self.pieces.sheet_depth]) / 2
+        return np.array([self.pieces.sheet_width, self.pieces.sheet_depth]) / 2 + self.margin_m
 
 
 def rectify(image: np.ndarray, camera: CameraModel, camera_from_sheet: np.ndarray, grid: SheetGrid) -> np.ndarray:

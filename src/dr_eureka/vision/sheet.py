@@ -17,11 +17,12 @@ FEWEST_MARKERS = 3
 
 
 class SheetError(DrEurekaError):
-    """The sheet was not located; the text says why, `markers` are the ids that were made out."""
+    """The sheet was not located; the text says why. `markers` are the ids made out, `duplicates` those seen twice."""
 
-    def __init__(self, reason: str, markers: tuple[int, ...] = ()):
+    def __init__(self, reason: str, markers: tuple[int, ...] = (), duplicates: tuple[int, ...] = ()):
         super().__init__(reason)
         self.markers = markers
+        self.duplicates = duplicates
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,8 @@ def locate_sheet(
     markers = tuple(sorted(corners))
     if len(markers) < FEWEST_MARKERS:
         limit = f"expected at least {FEWEST_MARKERS}"
-        raise SheetError(f"markers {list(markers)} of {sorted(pieces.marker_centres)} seen{twice}, {limit}", markers)
+        reason = f"markers {list(markers)} of {sorted(pieces.marker_centres)} seen{twice}, {limit}"
+        raise SheetError(reason, markers, tuple(sorted(set(detection.duplicates) & set(pieces.marker_centres))))
     pose = _fit(corners, camera, base_from_camera, pieces, settings)
     _check(pose, settings)
     return pose

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from dr_eureka.vision.camera import CameraModel
 from dr_eureka.vision.feet import Foot, FootSettings, find_feet
 from dr_eureka.vision.rectified import SheetGrid, paper_brightness, rectify
 from dr_eureka.vision.sheet import FEWEST_MARKERS, SheetError, SheetPose, SheetSettings, locate_sheet
+from dr_eureka.vision.tube_faults import FaultSettings, litter_on_sheet, other_dictionary
 
 NAMES = TUBES
 
@@ -23,11 +25,17 @@ class TubeResult:
     """Names of what came out of looking for the tubes."""
 
     OK = "OK"
+    BAD_IMAGE = "BAD_IMAGE"
     NO_SHEET = "NO_SHEET"
+    WRONG_DICTIONARY = "WRONG_DICTIONARY"
+    DUPLICATE_MARKER = "DUPLICATE_MARKER"
     TOO_FEW_MARKERS = "TOO_FEW_MARKERS"
     TUBE_MISSING = "TUBE_MISSING"
+    TUBE_HIDDEN = "TUBE_HIDDEN"
+    TUBE_FALLEN = "TUBE_FALLEN"
+    TUBE_OFF_SHEET = "TUBE_OFF_SHEET"
+    TUBES_TOUCHING = "TUBES_TOUCHING"
     TOO_MANY_TUBES = "TOO_MANY_TUBES"
-    BAD_IMAGE = "BAD_IMAGE"
 
 
 @dataclass(frozen=True)
@@ -38,8 +46,10 @@ class TubeSettings:
     marker_margin_m: float = field(metadata={"min": 0.0})
     smallest_contrast: float = field(metadata={"min": 1.0, "max": 255.0})
     systematic_sigma_m: float = field(metadata={"min": 0.0})
+    smallest_gap_m: float = field(metadata={"min": 0.0, "max": 0.2})
     sheet: SheetSettings
     foot: FootSettings
+    faults: FaultSettings
 
     @classmethod
     def load(cls, path: str = "config/dr_eureka_main.yaml") -> TubeSettings:
@@ -93,39 +103,99 @@ def locate_tubes(
     base_from_camera = np.asarray(base_from_camera, dtype=np.float64)
     if not _is_rigid(base_from_camera):
         return TubeScene(TubeResult.NO_SHEET, {}, None, (), "the camera's pose in base is not a rigid transform")
-    # Printed black is dark in every colour, a ball is bright in at least one: the brightest channel tells them apart.
-    straight = camera.undistort(image_rgb)
-    value = cv2.max(cv2.max(straight[..., 0], straight[..., 1]), straight[..., 2])
-    camera = camera.without_distortion()
-
+    straight, camera = camera.undistort(image_rgb), camera.without_distortion()
+    grey = cv2.cvtColor(straight, cv2.COLOR_RGB2GRAY)
     try:
-        sheet = locate_sheet(
-            cv2.cvtColor(straight, cv2.COLOR_RGB2GRAY), camera, base_from_camera, pieces, settings.sheet
-        )
+        sheet = locate_sheet(grey, camera, base_from_camera, pieces, settings.sheet)
     except SheetError as error:
-        too_few = 0 < len(error.markers) < FEWEST_MARKERS
-        result = TubeResult.TOO_FEW_MARKERS if too_few else TubeResult.NO_SHEET
-        return TubeScene(result, {}, None, error.markers, str(error))
+        result, reason = _sheet_fault(error, grey, pieces)
+        return TubeScene(result, {}, None, error.markers, reason)
 
+    # Printed black is dark in every colour, a ball is bright in at least one: the brightest channel tells them apart.
+    value = cv2.max(cv2.max(straight[..., 0], straight[..., 1]), straight[..., 2])
     grid = SheetGrid(pieces, settings.pixels_per_metre)
-    rectified = rectify(value, camera, sheet.camera_from_sheet, grid)
-    brightness = paper_brightness(
-        rectified, grid, sheet.markers, settings.marker_margin_m, settings.smallest_contrast
-    )
+    brightness = _brightness(value, camera, sheet, grid, settings)
     if brightness is None:
         reason = f"markers have less than {settings.smallest_contrast:g} grey levels of contrast"
         return TubeScene(TubeResult.NO_SHEET, {}, None, sheet.markers, reason)
+    feet = _feet(brightness, sheet, grid, settings)
+    places = sorted((_place(foot, sheet, grid, settings) for foot in feet), key=lambda place: -place.position[1])
+    if len(feet) < len(NAMES):
+        result, reason = _why_missing(straight, value, brightness, camera, sheet, feet, grid, settings)
+    else:
+        result, reason = _fault_of(places, pieces, settings)
+    tubes = dict(zip(NAMES, places)) if result == TubeResult.OK else {}
+    return TubeScene(result, tubes, sheet.base_from_sheet, sheet.markers, reason)
+
+
+def _sheet_fault(error: SheetError, grey: np.ndarray, pieces: Pieces) -> tuple[str, str]:
+    """Return result and reason when the sheet was not located."""
+    if len(error.markers) >= FEWEST_MARKERS:
+        return TubeResult.NO_SHEET, str(error)
+    if len(error.markers) + len(error.duplicates) >= FEWEST_MARKERS:
+        return TubeResult.DUPLICATE_MARKER, str(error)
+    other = other_dictionary(grey, pieces.marker_dictionary, set(pieces.marker_centres))
+    if other:
+        return TubeResult.WRONG_DICTIONARY, f"the sheet's markers are of {other}, expected {pieces.marker_dictionary}"
+    return TubeResult.TOO_FEW_MARKERS if error.markers else TubeResult.NO_SHEET, str(error)
+
+
+def _brightness(
+    value: np.ndarray, camera: CameraModel, sheet: SheetPose, grid: SheetGrid, settings: TubeSettings
+) -> np.ndarray | None:
+    rectified = rectify(value, camera, sheet.camera_from_sheet, grid)
+    return paper_brightness(rectified, grid, sheet.markers, settings.marker_margin_m, settings.smallest_contrast)
+
+
+def _feet(brightness: np.ndarray, sheet: SheetPose, grid: SheetGrid, settings: TubeSettings) -> list[Foot]:
     below_camera = grid.pixels(np.linalg.inv(sheet.camera_from_sheet)[:2, 3])
-    radius_px = pieces.foot_radius * settings.pixels_per_metre
-    rim_px = radius_px - pieces.tube_outer_radius * settings.pixels_per_metre
-    feet = find_feet(brightness, below_camera, radius_px, rim_px, settings.foot)
-    if len(feet) != len(NAMES):
-        result = TubeResult.TUBE_MISSING if len(feet) < len(NAMES) else TubeResult.TOO_MANY_TUBES
-        reason = f"{len(feet)} tube feet seen on the sheet, expected {len(NAMES)}"
-        return TubeScene(result, {}, sheet.base_from_sheet, sheet.markers, reason)
-    places = [_place(foot, sheet, grid, settings) for foot in feet]
-    places.sort(key=lambda place: -place.position[1])
-    return TubeScene(TubeResult.OK, dict(zip(NAMES, places)), sheet.base_from_sheet, sheet.markers, "")
+    radius_px = grid.pieces.foot_radius * grid.pixels_per_metre
+    rim_px = radius_px - grid.pieces.tube_outer_radius * grid.pixels_per_metre
+    return find_feet(brightness, below_camera, radius_px, rim_px, settings.foot)
+
+
+def _fault_of(places: list[TubePlace], pieces: Pieces, settings: TubeSettings) -> tuple[str, str]:
+    """Return result and reason for three feet or more, from left to right."""
+    if len(places) > len(NAMES):
+        return TubeResult.TOO_MANY_TUBES, f"{len(places)} tube feet seen on the sheet, expected {len(NAMES)}"
+    for (first, one), (second, other) in combinations(zip(NAMES, places), 2):
+        gap = float(np.linalg.norm(one.position - other.position)) - 2 * pieces.foot_radius
+        if gap < settings.smallest_gap_m:
+            limit = f"expected at least {1000 * settings.smallest_gap_m:g} mm"
+            return TubeResult.TUBES_TOUCHING, f"feet of the {first} and {second} tube are {1000 * gap:.1f} mm apart, {limit}"
+    return TubeResult.OK, ""
+
+
+def _why_missing(
+    straight: np.ndarray,
+    value: np.ndarray,
+    brightness: np.ndarray,
+    camera: CameraModel,
+    sheet: SheetPose,
+    feet: list[Foot],
+    grid: SheetGrid,
+    settings: TubeSettings,
+) -> tuple[str, str]:
+    """Return result and reason when fewer than three feet stand on the sheet."""
+    pieces, faults = grid.pieces, settings.faults
+    count = f"{len(feet)} tube feet seen on the sheet, expected {len(NAMES)}"
+    around = SheetGrid(pieces, settings.pixels_per_metre, faults.margin_m)
+    half = np.array([pieces.sheet_depth, pieces.sheet_width]) / 2
+    anywhere = _feet(_brightness(value, camera, sheet, around, settings), sheet, around, settings)
+    outside = sum((np.abs(around.points(foot.centre)) > half).any() for foot in anywhere)
+    if outside:
+        return TubeResult.TUBE_OFF_SHEET, f"{count}; {outside} beside it"
+    points = np.array([grid.points(foot.centre) for foot in feet]).reshape(-1, 2)
+    camera_in_sheet = np.linalg.inv(sheet.camera_from_sheet)[:3, 3]
+    rectified = rectify(straight, camera, sheet.camera_from_sheet, grid)
+    litter = litter_on_sheet(rectified, brightness, points, camera_in_sheet, grid, faults)
+    if litter.cover:
+        return TubeResult.TUBE_HIDDEN, f"{count}; something as large as {litter.cover:.1f} feet covers the sheet"
+    if litter.behind:
+        return TubeResult.TUBE_HIDDEN, f"{count}; something black is behind a tube"
+    if litter.black:
+        return TubeResult.TUBE_FALLEN, f"{count}; something black lies on it, as large as {litter.black:.1f} feet"
+    return TubeResult.TUBE_MISSING, count
 
 
 def _image_problem(image: np.ndarray, camera: CameraModel) -> str:
