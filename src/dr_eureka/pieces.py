@@ -14,7 +14,7 @@ _LENGTH = {"min": 1e-4, "max": 1.0}
 
 @dataclass(frozen=True)
 class Pieces:
-    """Balls, tubes, sheet and cards. Lengths in m, colours in sRGB 0-255; see `config/pieces.yaml`.
+    """Balls, tubes, sheet, cards and the markers of the hands. Lengths in m, colours in sRGB 0-255; see `config/pieces.yaml`.
 
     The frame `sheet` has its origin at the centre of the printed side, x away from the robot, y to its left, z up.
     """
@@ -34,6 +34,10 @@ class Pieces:
     marker_dictionary: str
     marker_centres: dict[int, tuple[float, float]] = field(metadata={"min": -1.0, "max": 1.0})
     card_side: float = field(metadata=_LENGTH)
+    hand_marker_side: float = field(metadata=_LENGTH)
+    hand_marker_margin: float = field(metadata=_LENGTH)
+    hand_markers: dict[str, int]
+    hand_marker_centre: tuple[float, float, float] = field(metadata={"min": -1.0, "max": 1.0})
 
     @property
     def ball_radius(self) -> float:
@@ -53,6 +57,12 @@ class Pieces:
         """
         half = self.marker_side / 2
         return np.add(self.marker_centres[marker], [(half, half), (half, -half), (-half, -half), (-half, half)])
+
+    def hand_marker_corners(self) -> np.ndarray:
+        """Return the corners (4, 3) [m] of the marker on a hand, in the frame of its end link and in ArUco's order."""
+        half = self.hand_marker_side / 2
+        flat = [(half, half, 0.0), (half, -half, 0.0), (-half, -half, 0.0), (-half, half, 0.0)]
+        return np.add(self.hand_marker_centre, flat)
 
 
 def load_pieces(path: str = "config/pieces.yaml") -> Pieces:

@@ -6,9 +6,10 @@ from typing import Mapping, Sequence
 
 import numpy as np
 
+from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.codes import ControlError
 from dr_eureka.control.trajectory import MINIMUM_JERK_PEAK_SPEED, JointTrajectory, MotionLimits
-from dr_eureka.kinematics.arms import arm_chain, arm_joint_names, mirror
+from dr_eureka.kinematics.arms import arm_joint_names, mirror
 from dr_eureka.kinematics.hybrid import HybridSettings, HybridSolver, IkCode, IkResult
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.kinematics.transforms import rotation_about, rotation_vector, transform
@@ -17,12 +18,22 @@ _TURN_SPACING = 0.15  # [rad] between solved poses where the hand turns
 
 
 class Arm:
-    """Plan joint trajectories for one hand; angles in rad, poses of the end link in `base` (4, 4)."""
+    """Plan joint trajectories for one hand; angles in rad as the robot reports them, poses of the end link in `base` (4, 4).
 
-    def __init__(self, hand: str, settings: HybridSettings, network: ArmNetwork | None):
+    Poses are where the hand really is or shall be: what the arm's calibration sets right is set right here, for every skill.
+    """
+
+    def __init__(
+        self,
+        hand: str,
+        settings: HybridSettings,
+        network: ArmNetwork | None,
+        calibration: ArmCalibration | None = None,
+    ):
         self.hand = hand
         self.joints = arm_joint_names(hand)
-        self.chain = arm_chain(hand)
+        self._calibration = calibration or ArmCalibration(hand)
+        self.chain = self._calibration.chain()
         self._solver = HybridSolver(self.chain, network, settings)
 
     def posture(self, left_posture: Sequence[float]) -> np.ndarray:
@@ -36,15 +47,20 @@ class Arm:
 
     def pose(self, joints: Mapping[str, float]) -> np.ndarray:
         """Return base_from_end (4, 4) for measured joints."""
-        return self.chain.forward(self.positions(joints))
+        return self.forward(self.positions(joints))
+
+    def forward(self, angles: np.ndarray) -> np.ndarray:
+        """Return base_from_end (4, 4) for this arm's joint angles (7,)."""
+        return self._calibration.reached(self.chain.forward(angles))
 
     def solve(self, start: np.ndarray, base_from_end: np.ndarray, code: str, what: str, rest: np.ndarray | None = None) -> np.ndarray:
         """Return joint angles (7,) for a hand pose; raise ControlError with `code`, naming `what` could not be reached."""
-        return self._checked(self._solver.solve(start, base_from_end, rest=rest), base_from_end, code, what)
+        result = self._solver.solve(start, self._calibration.commanded(base_from_end), rest=rest)
+        return self._checked(result, base_from_end, code, what)
 
     def path(self, start: np.ndarray, poses: Sequence[np.ndarray], code: str, what: str, rest: np.ndarray | None = None) -> np.ndarray:
         """Return joint angles (k, 7) through neighbouring hand poses, without jumps; raises as `solve`."""
-        results = self._solver.solve_path(start, poses, rest=rest)
+        results = self._solver.solve_path(start, [self._calibration.commanded(pose) for pose in poses], rest=rest)
         return np.array([self._checked(result, pose, code, what) for result, pose in zip(results, poses)])
 
     def _checked(self, result: IkResult, base_from_end: np.ndarray, code: str, what: str) -> np.ndarray:
@@ -65,7 +81,7 @@ class Arm:
         Poses are solved every `spacing` [m] of the way. At a constant height the hand passes over standing tubes, which a straight
         line in joint space does not promise.
         """
-        begin = self.chain.forward(start)
+        begin = self.forward(start)
         shift = end[:3, 3] - begin[:3, 3]
         turn = rotation_vector(end[:3, :3] @ begin[:3, :3].T)
         angle = float(np.linalg.norm(turn))
@@ -77,14 +93,15 @@ class Arm:
             # Guessing near the straight line in joint space keeps the arm's spare freedom from wandering on the way.
             guess = start + share * (last - start)
             pose = transform(rotation_about(axis, share * angle) @ begin[:3, :3], begin[:3, 3] + share * shift)
-            points.append(self._checked(self._solver.solve(guess, pose, rest=guess, restarts=0), pose, code, what))
+            result = self._solver.solve(guess, self._calibration.commanded(pose), rest=guess, restarts=0)
+            points.append(self._checked(result, pose, code, what))
         return JointTrajectory.within(np.array(points), limits)
 
     def line(
         self, start: np.ndarray, translation: np.ndarray, spacing: float, hand_speed: float, limits: MotionLimits, code: str, what: str
     ) -> JointTrajectory:
         """Return a trajectory that moves the hand straight by a translation (3,) [m], orientation kept, at most at `hand_speed` [m/s]."""
-        end = self.chain.forward(start)
+        end = self.forward(start)
         end[:3, 3] += translation
         trajectory = self.glide(start, end, spacing, limits, code, what, rest=start)
         slowest = MINIMUM_JERK_PEAK_SPEED * float(np.linalg.norm(translation)) / hand_speed

@@ -8,6 +8,7 @@ from typing import Mapping
 import numpy as np
 
 from dr_eureka.control.arm import Arm
+from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.codes import ControlError, EngineCode
 from dr_eureka.control.port import grip_joint
 from dr_eureka.control.settings import ControlSettings
@@ -41,9 +42,12 @@ class Body:
     """Joint angles (7,) by hand from which the tubes were brought to the ready pose: the way back."""
 
     @classmethod
-    def build(cls, settings: ControlSettings, pieces: Pieces, network: ArmNetwork | None) -> Body:
-        """Make the body with its two arms."""
-        return cls(settings, pieces, {hand: Arm(hand, settings.kinematics, network) for hand in HANDS})
+    def build(
+        cls, settings: ControlSettings, pieces: Pieces, network: ArmNetwork | None, calibrations: Mapping[str, ArmCalibration]
+    ) -> Body:
+        """Make the body with its two arms; one without a calibration is as drawn."""
+        arms = {hand: Arm(hand, settings.kinematics, network, calibrations.get(hand)) for hand in HANDS}
+        return cls(settings, pieces, arms)
 
     def commanded(self, hand: str) -> np.ndarray:
         """Return the arm's joint angles (7,) as last commanded: where the next trajectory must start."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from types import MappingProxyType
 from typing import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.body import Body
 from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode, EngineState
 from dr_eureka.control.limits import CommandLimiter, JointLimit
@@ -42,8 +44,14 @@ class ControlEngine:
     Source: paper Figure 5 (Control Engine), 3.4 and 3.5.
     """
 
-    def __init__(self, settings: ControlSettings, pieces: Pieces, network: ArmNetwork | None = None):
-        self.body = Body.build(settings, pieces, network)
+    def __init__(
+        self,
+        settings: ControlSettings,
+        pieces: Pieces,
+        network: ArmNetwork | None = None,
+        calibrations: Mapping[str, ArmCalibration] = MappingProxyType({}),
+    ):
+        self.body = Body.build(settings, pieces, network, calibrations)
         self.settings = settings
         self.ranges = self._ranges()
         self._limiter = CommandLimiter(

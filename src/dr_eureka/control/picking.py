@@ -97,5 +97,5 @@ def place(body: Body, hand: str, tube: str, foot: np.ndarray) -> Iterator[Motion
     if all(tube in reach for reach in DEFAULT_REACH.values()):
         # The other hand may come for it next.
         home = arm.posture(settings.postures.home)
-        end = arm.chain.forward(home)
+        end = arm.forward(home)
         yield Follow(((arm.joints, _level_way(body, hand, end, settings.speeds.move, "home", home)),))

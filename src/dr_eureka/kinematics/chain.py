@@ -45,6 +45,7 @@ class Chain:
         self._axis_columns = self._axes[:, :, None]
         self._tip = np.asarray(tip, dtype=float)
         self._links = dict(links)
+        self._origins, self._limits = np.asarray(origins, dtype=float), np.asarray(limits, dtype=float)
         along = np.zeros((len(self.joint_names), 4, 4))
         sine = np.zeros_like(along)
         cosine = np.zeros_like(along)
@@ -91,6 +92,20 @@ class Chain:
 
     def __len__(self) -> int:
         return len(self.joint_names)
+
+    def adjusted(self, offsets: np.ndarray, stretches: np.ndarray) -> Chain:
+        """Return the chain of an arm that is not quite as drawn.
+
+        offsets (n,) [rad]: a joint that reports q stands at q + offset. stretches (n,) [m]: how much farther each joint
+        sits from the one before it (from the root, for the first), in the same direction; where both are in one place,
+        there is no such direction and the stretch is left out.
+        """
+        turns = [transform(rotation_about(axis, angle)) for axis, angle in zip(self._axes, offsets)]
+        origins = self._origins @ np.array(turns)
+        lengths = np.linalg.norm(self._origins[:, :3, 3], axis=1)
+        shares = np.divide(stretches, lengths, out=np.zeros(len(self)), where=lengths > 0.0)
+        origins[:, :3, 3] *= 1.0 + shares[:, None]
+        return Chain(self.joint_names, self._axes, origins, self._tip, self._limits, self._links)
 
     @property
     def first_joint_origin(self) -> np.ndarray:

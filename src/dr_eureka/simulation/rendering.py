@@ -21,6 +21,7 @@ from dr_eureka.simulation.placement import Placement
 from dr_eureka.simulation.robot import SimulatedRobot
 from dr_eureka.simulation.settings import CameraSettings, SimulationError
 from dr_eureka.simulation.tube_model import WALL_COLOUR, WALL_SHAPE
+from dr_eureka.vision.aruco import marker_image
 
 EGL, TINY = "egl", "tiny"
 # Paper lies a little above what it covers, or the two flicker through one another.
@@ -29,6 +30,7 @@ LAMP_DISTANCE = 10.0
 # The auto-exposure is off: white paper in nominal light is a light grey.
 EXPOSURE = 0.85
 NOISE_MARGIN = 32
+HAND_MARKER_PX_PER_M = 4000
 _picture_numbers = itertools.count()
 _PROBE = """
 import importlib.util, pybullet
@@ -126,6 +128,8 @@ class HeadCamera:
             depth, width = pieces.sheet_depth / 2, pieces.sheet_width / 2
             corners = [(depth, width, 0.0), (depth, -width, 0.0), (-depth, -width, 0.0), (-depth, width, 0.0)]
             self._add_picture("sheet", textures.sheet, corners, placement.base_from_sheet)
+        self._hand_markers = {f"{hand[0]}_arm_end_link": self._add_hand_marker(marker)
+                              for hand, marker in pieces.hand_markers.items() if settings.hand_markers}
         self.show_card(textures.card)
 
     def show_card(self, picture: np.ndarray | None) -> None:
@@ -137,6 +141,20 @@ class HeadCamera:
             side = self._pieces.card_side / 2
             corners = [(-side, side, 0.0), (side, side, 0.0), (side, -side, 0.0), (-side, -side, 0.0)]
             self._card = self._add_picture("card", picture, corners, self._placement.base_from_card)
+
+    def _add_hand_marker(self, marker: int) -> int:
+        """Add a body that shows a marker at its place in the frame of a hand's end link."""
+        pieces = self._pieces
+        side, margin = (round(length * HAND_MARKER_PX_PER_M) for length in (pieces.hand_marker_side, pieces.hand_marker_margin))
+        picture = np.pad(marker_image(marker, side, pieces.marker_dictionary), margin, constant_values=255)
+        centre = np.array(pieces.hand_marker_centre)
+        outward = (pieces.hand_marker_corners() - centre) * (1.0 + 2.0 * pieces.hand_marker_margin / pieces.hand_marker_side)
+        return self._add_picture(f"hand_marker_{marker}", picture, (centre + outward).tolist(), np.eye(4))
+
+    def _place_hand_markers(self) -> None:
+        for link, body in self._hand_markers.items():
+            pose = self._robot.link_pose(link)
+            self._client.resetBasePositionAndOrientation(body, pose[:3, 3].tolist(), _quaternion(pose[:3, :3]))
 
     def _add_picture(self, name: str, picture: np.ndarray, corners, base_from_picture: np.ndarray) -> int:
         """Add a flat body with a picture on it; only seen, never touched."""
@@ -158,6 +176,7 @@ class HeadCamera:
 
     def image(self) -> np.ndarray:
         """Return the present view as (height, width, 3) uint8 RGB, with the sensor's gain and noise."""
+        self._place_hand_markers()
         if self._renderer == EGL:
             scene = self._render()
         else:

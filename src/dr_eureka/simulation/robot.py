@@ -1,6 +1,7 @@
 """THORMANG3's upper body in PyBullet: joints under position control, grippers with one motor each."""
 from __future__ import annotations
 
+import itertools
 from typing import Mapping
 
 import numpy as np
@@ -8,6 +9,8 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from dr_eureka.resources import resource_path
+from dr_eureka.simulation.arm_errors import ArmErrors, stretch_links
+from dr_eureka.simulation.bodies import scratch_folder
 from dr_eureka.simulation.joints import ALL_JOINTS, GRIP_FOLLOWERS, LEG_JOINTS, SIMULATED_JOINTS
 from dr_eureka.simulation.settings import PhysicsSettings, ServoSettings, SimulationError
 
@@ -18,21 +21,23 @@ GEAR_ERP = 0.9
 # Which links may touch which of the robot's own; neighbours and what cannot meet are left out for speed.
 _FOREARM = ("el_y", "wr_r", "wr_y", "wr_p", "grip", "grip_1")
 _TRUNK = ("pelvis_link", "chest_link", "head_p_link")
+_robot_numbers = itertools.count()
 
 
 class SimulatedRobot:
     """The robot in one PyBullet world, fixed at the pelvis.
 
     Goals pass a speed limit and reach the servos in equal parts over the physics steps of a control cycle. Servos are
-    stiff and limited in torque by the URDF's effort. Angles rad.
+    stiff and limited in torque by the URDF's effort. Angles rad, as the robot reports them: hidden `errors` of the arms
+    are between them and the truth.
     """
 
     def __init__(self, client: BulletClient, servos: ServoSettings, physics: PhysicsSettings, cycle: float,
-                 start: Mapping[str, float]) -> None:
+                 start: Mapping[str, float], errors: ArmErrors) -> None:
         self._client = client
         self._servos = servos
         self._cycle = cycle
-        self.body = client.loadURDF(str(resource_path(URDF)), useFixedBase=True,
+        self.body = client.loadURDF(_description(errors), useFixedBase=True,
                                     flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_SELF_COLLISION)
         self.link_index = {"base": -1}
         self.joint_index = {}
@@ -44,6 +49,7 @@ class SimulatedRobot:
             lower[name], upper[name], effort[name] = info[8], info[9], info[10]
         self._names = SIMULATED_JOINTS + tuple(GRIP_FOLLOWERS.values())
         self._indices = [self.joint_index[name] for name in self._names]
+        self._offsets = np.array([errors.offsets.get(name, 0.0) for name in self._names])
         self._lower = np.array([lower[name] for name in self._names])
         self._upper = np.array([upper[name] for name in self._names])
         self._is_grip = np.array(["grip" in name for name in self._names])
@@ -66,7 +72,7 @@ class SimulatedRobot:
         if unknown:
             raise SimulationError(f"start joints: unknown {', '.join(unknown)}; expected some of {', '.join(SIMULATED_JOINTS)}")
         angles = self._vector({name: start.get(name, 0.0) for name in SIMULATED_JOINTS})
-        for index, angle in zip(self._indices, angles):
+        for index, angle in zip(self._indices, angles + self._offsets):
             self._client.resetJointState(self.body, index, angle)
         return angles
 
@@ -140,13 +146,13 @@ class SimulatedRobot:
 
     def drive(self, share: float) -> None:
         """Command the servos to the set-point reached at `share` (0..1) of this cycle."""
-        targets = self._previous + (self._setpoints - self._previous) * share
+        targets = self._offsets + self._previous + (self._setpoints - self._previous) * share
         self._client.setJointMotorControlArray(
             self.body, self._indices, pybullet.POSITION_CONTROL, targetPositions=targets.tolist(), forces=self._forces,
             positionGains=self._gains, velocityGains=self._velocity_gains)
 
     def _angles(self) -> np.ndarray:
-        return np.array([state[0] for state in self._client.getJointStates(self.body, self._indices)])
+        return np.array([state[0] for state in self._client.getJointStates(self.body, self._indices)]) - self._offsets
 
     def positions(self) -> dict[str, float]:
         """Return the present angle of each of the manager's 31 joints [rad]; the legs, not simulated, are at 0."""
@@ -158,7 +164,7 @@ class SimulatedRobot:
         return {name: state[3] for name, state in zip(SIMULATED_JOINTS, states)}
 
     def link_pose(self, link: str) -> np.ndarray:
-        """Return the (4, 4) pose of a link's frame in `base` [m]; raises SimulationError for an unknown link."""
+        """Return the true (4, 4) pose of a link's frame in `base` [m]; raises SimulationError for an unknown link."""
         if link not in self.link_index:
             raise SimulationError(f"link {link!r}: unknown; expected one of {', '.join(self.link_index)}")
         pose = np.eye(4)
@@ -167,3 +173,13 @@ class SimulatedRobot:
             pose[:3, :3] = np.reshape(self._client.getMatrixFromQuaternion(state[5]), (3, 3))
             pose[:3, 3] = state[4]
         return pose
+
+
+def _description(errors: ArmErrors) -> str:
+    """Return the path of the URDF to load: the robot as drawn, or one made for its errors."""
+    if not errors.stretches:
+        return str(resource_path(URDF))
+    # PyBullet remembers files by name: a new robot needs a new one.
+    path = scratch_folder() / f"robot_{next(_robot_numbers)}.urdf"
+    path.write_text(stretch_links(resource_path(URDF).read_text(encoding="utf-8"), errors.stretches), encoding="utf-8")
+    return str(path)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.resources import load_yaml
 from dr_eureka.settings import build
+from dr_eureka.simulation.arm_errors import ArmErrorSettings
 
 CONFIG = "config/fake_robotis_manager.yaml"
 _POSITIVE = {"min": 1e-9}
@@ -80,7 +81,10 @@ class ScatterSettings:
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """The head camera: size and intrinsics in px, plumb-bob distortion k1 k2 p1 p2 k3, rendering choices."""
+    """The head camera: size and intrinsics in px, plumb-bob distortion k1 k2 p1 p2 k3, rendering choices.
+
+    With `hand_markers`, the markers that calibrate_arm looks for are on the hands.
+    """
 
     width: int = field(metadata={"min": 16, "max": 4096})
     height: int = field(metadata={"min": 16, "max": 4096})
@@ -94,6 +98,7 @@ class CameraSettings:
     renderer: str = field(metadata={"choices": ("auto", "egl", "tiny")})
     wall_tint: float = field(metadata={"min": 0.0, "max": 1.0})
     noise: float = field(metadata={"min": 0.0, "max": 50.0})
+    hand_markers: bool
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,7 @@ class WorldSettings:
     layout: LayoutSettings
     scatter: ScatterSettings
     referee: RefereeSettings
+    arm_errors: ArmErrorSettings
 
 
 def load_world_settings(path: str = CONFIG) -> WorldSettings:

@@ -9,6 +9,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from dr_eureka.game.state import START, TUBES, State
 from dr_eureka.pieces import Pieces, load_pieces
+from dr_eureka.simulation.arm_errors import draw_arm_errors
 from dr_eureka.simulation.bodies import BodyMaker, scratch_folder, set_up_physics
 from dr_eureka.simulation.placement import draw_placement
 from dr_eureka.simulation.quiet import quiet_stdout
@@ -54,7 +55,8 @@ class World:
             renderer = open_renderer(self._client, camera.renderer) if camera else None
         client, layout = self._client, settings.layout
         set_up_physics(client, settings.physics, settings.cycle)
-        self._robot = SimulatedRobot(client, settings.servos, settings.physics, settings.cycle, layout.start_joints)
+        self._robot = SimulatedRobot(client, settings.servos, settings.physics, settings.cycle, layout.start_joints,
+                                     draw_arm_errors(settings.arm_errors))
         self.placement = draw_placement(settings, seed, self._robot.link_pose("cam_link")[:3, 3])
         self._bodies = BodyMaker(client, settings.physics, self._pieces, self.placement.friction,
                                  self.placement.restitution, camera.wall_tint if camera else 1.0)
@@ -134,6 +136,12 @@ class World:
     def ball_positions(self) -> list[tuple[str, np.ndarray]]:
         """Return each ball's colour letter and true centre in `base` [m]."""
         return [(colour, np.array(self._client.getBasePositionAndOrientation(ball)[0])) for colour, ball in self._balls]
+
+    def put_ball(self, index: int, centre: np.ndarray) -> None:
+        """Put the ball that `ball_positions` lists at `index` elsewhere, centre (3,) in `base` [m], at rest; for `faults` only."""
+        ball = self._balls[index][1]
+        self._client.resetBasePositionAndOrientation(ball, np.asarray(centre).tolist(), (0.0, 0.0, 0.0, 1.0))
+        self._client.resetBaseVelocity(ball, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def contacts(self) -> set[tuple[str, str]]:
         """Return the pairs of things that touch one another now, by name (links of the robot, tubes, table, board, balls)."""
