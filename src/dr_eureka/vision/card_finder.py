@@ -23,6 +23,7 @@ _SEARCH_HEIGHT_PX = 240
 _OUTLINES_A_PLACE = 2  # of one card at several thresholds, tried in turn when it cannot be read
 _NEXT = [1, 2, 3, 0]
 _COARSE_PX = 64
+THUMBNAIL_PX = 2 * _COARSE_PX  # of a crop that is large enough for coloured_share
 _SIDE_SHARES = np.linspace(0.06, 0.94, _SAMPLES_A_SIDE, dtype=np.float32)[:, None]  # of a side, where it is sampled
 _SAMPLED_SCALES = np.array([1.07, 0.93], np.float32)[:, None, None]  # of the ground: in its border and inside it
 _PLAIN_CHROMA = 0.15  # largest less smallest channel, of the border's white; purple, the palest ball, has 0.32
@@ -127,21 +128,21 @@ def group(candidates: list[Candidate], most: int) -> list[list[Candidate]]:
     return groups[:most]
 
 
-def rectify(image: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rectify(image: np.ndarray, ground: np.ndarray, side_px: int = CROP_PX) -> tuple[np.ndarray, np.ndarray]:
     """Cut a card out by its ground's corners (4, 2), clockwise from the one that becomes the upper left.
 
-    Returns the crop (416, 416, 3), in which a card of nominal border fills the frame, and the homography from picture
-    to crop pixels.
+    Returns the crop (side_px, side_px, 3), in which a card of nominal border fills the frame, and the homography from
+    picture to crop pixels.
     """
-    near, far = NOMINAL_BORDER * CROP_PX - 0.5, (1 - NOMINAL_BORDER) * CROP_PX - 0.5
+    near, far = NOMINAL_BORDER * side_px - 0.5, (1 - NOMINAL_BORDER) * side_px - 0.5
     target = np.array([(near, near), (far, near), (far, far), (near, far)], np.float32)
     homography = cv2.getPerspectiveTransform(ground.astype(np.float32), target)
-    crop = cv2.warpPerspective(image, homography, (CROP_PX, CROP_PX), borderMode=cv2.BORDER_REPLICATE)
+    crop = cv2.warpPerspective(image, homography, (side_px, side_px), borderMode=cv2.BORDER_REPLICATE)
     return crop, homography
 
 
 def coloured_share(crop: np.ndarray) -> float:
-    """Return which share of a crop is plainly coloured, its border taken for white: balls are, markers are not."""
+    """Return which share of a crop of any size is plainly coloured, its border taken for white: balls are, markers are not."""
     small = cv2.resize(crop, (_COARSE_PX, _COARSE_PX), interpolation=cv2.INTER_AREA).astype(np.float32)
     edge = np.concatenate((small[2], small[-3], small[:, 2], small[:, -3]))
     margin = int(1.5 * NOMINAL_BORDER * _COARSE_PX)  # what surrounds the dark ground may have any colour

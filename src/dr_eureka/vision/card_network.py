@@ -8,6 +8,7 @@ from typing import Mapping
 import numpy as np
 import torch
 
+from dr_eureka.memory import keep_freed_memory
 from dr_eureka.vision.card_architecture import FIRST_FOOT, GRID, from_arrays
 
 _BALL_SIZE = 0.125  # diameter a zero output stands for, as a fraction of the crop
@@ -60,10 +61,14 @@ class CardNetwork:
     def __init__(self, arrays: Mapping[str, np.ndarray], threads: int = 1, model: str = "eureka") -> None:
         """Build from folded weights (card_architecture.to_arrays). Raises ValueError when a shape does not fit."""
         torch.set_num_threads(threads)
-        self._network = from_arrays(arrays, model).to(memory_format=torch.channels_last)
+        keep_freed_memory()
+        network = from_arrays(arrays, model)
+        with torch.no_grad():
+            network.features[0][0].weight.div_(255.0)  # here once instead of for each pixel
+        self._network = network.to(memory_format=torch.channels_last)
 
     def detect(self, crop_rgb: np.ndarray) -> GridDetections:
         """Return what is seen in one crop (416, 416, 3) uint8 RGB, as a batch of one."""
-        image = torch.from_numpy(np.ascontiguousarray(crop_rgb)).permute(2, 0, 1)[None].float().div_(255.0)
+        image = torch.from_numpy(np.ascontiguousarray(crop_rgb)).permute(2, 0, 1)[None].float()
         with torch.no_grad():
             return decode(self._network(image))

@@ -14,7 +14,7 @@ from dr_eureka.settings import build
 from dr_eureka.vision.card_colours import ODD, PLAIN, oddest_ball
 from dr_eureka.vision.card_detections import CropDetections, SeenBall, collect
 from dr_eureka.vision.card_finder import (
-    NOMINAL_BORDER, Candidate, FinderSettings, coloured_share, find_candidates, group, rectify,
+    NOMINAL_BORDER, THUMBNAIL_PX, Candidate, FinderSettings, coloured_share, find_candidates, group, rectify,
 )
 from dr_eureka.vision.card_layout import CardLayout, LayoutError, read_layout, turned
 
@@ -148,9 +148,10 @@ class CardReader:
         return looks
 
     def _look_once(self, image_rgb: np.ndarray, ground: np.ndarray) -> _Look:
-        crop, _ = rectify(image_rgb, ground)
-        if coloured_share(crop) < self._settings.finder.least_coloured:
+        thumbnail, _ = rectify(image_rgb, ground, THUMBNAIL_PX)
+        if coloured_share(thumbnail) < self._settings.finder.least_coloured:
             return _Look(CropDetections((), ()), ground, None, "nothing in it is coloured")
+        crop, _ = rectify(image_rgb, ground)
         grid = self._network.detect(crop)
         arrays = (a[0].numpy() for a in (grid.balls, grid.diameters, grid.class_scores, grid.feet))
         seen = collect(*arrays, threshold=self._settings.doubt_confidence)
