@@ -5,6 +5,7 @@ import sys
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 from dr_eureka.bench.report import BenchError, BenchOptions, Row, mean_row, number, progress, share_row, table_lines
@@ -97,10 +98,17 @@ def test_a_run_writes_one_document_with_a_row_a_figure(fakes, tmp_path, capsys):
     assert "seconds" in capsys.readouterr().out
 
 
-def test_a_figure_that_falls_short_is_exit_code_1(fakes, capsys):
-    fakes(first=[Row("seconds", 3.0, "s", goal="<= 2", ok=False)])
+@pytest.mark.parametrize("no", [False, np.False_])
+def test_a_figure_that_falls_short_is_exit_code_1(fakes, capsys, no):
+    fakes(first=[Row("seconds", 3.0, "s", goal="<= 2", ok=no)])
     assert benchmark.main(["first"]) == 1
     assert "SHORT" in capsys.readouterr().out
+
+
+def test_a_goal_that_could_not_be_measured_is_no_success(fakes, capsys):
+    fakes(first=[Row("share (no weights)", None, "share", goal=">= 0.9"), Row("seconds", 1.0, "s", goal="<= 2", ok=True)])
+    assert benchmark.main(["first"]) == 1
+    assert "1 of 2 goals met" in capsys.readouterr().out
 
 
 def test_a_benchmark_that_fails_is_told_in_a_line_and_the_others_go_on(fakes, tmp_path, capsys):

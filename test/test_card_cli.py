@@ -28,6 +28,7 @@ def pictures(tmp_path_factory):
         "black.png": np.zeros((480, 640, 3), np.uint8),
         "white.png": np.full((480, 640, 3), 255, np.uint8),
         "point.png": np.zeros((1, 1, 3), np.uint8),
+        "ribbon.png": np.zeros((32, 100_000, 3), np.uint8),
         "large_grey.jpg": np.full((3000, 4000, 3), 128, np.uint8),
     }.items():
         cv2.imwrite(str(folder / name), picture)
@@ -37,7 +38,8 @@ def pictures(tmp_path_factory):
     # EXIF orientation 6: the camera was held upright, the picture must be turned a quarter clockwise to be seen right.
     exif = b"Exif\x00\x00MM\x00*\x00\x00\x00\x08\x00\x01\x01\x12\x00\x03\x00\x00\x00\x01\x00\x06\x00\x00" + bytes(4)
     on_its_side = cv2.imencode(".jpg", np.rot90(card))[1].tobytes()
-    (folder / "turned.jpg").write_bytes(on_its_side[:2] + b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big") + exif + on_its_side[2:])
+    marker = b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big")
+    (folder / "turned.jpg").write_bytes(on_its_side[:2] + marker + exif + on_its_side[2:])
     (folder / "empty.png").write_bytes(b"")
     (folder / "text.jpg").write_text("no picture\n", encoding="ascii")
     return folder
@@ -70,7 +72,7 @@ def test_a_card_is_read_from_every_kind_of_picture(pictures, capsys):
     np.testing.assert_allclose(np.array(readings[4]["corners"]) / 6.25, readings[0]["corners"], atol=3.0)
 
 
-@pytest.mark.parametrize("name", ["black.png", "white.png", "point.png", "large_grey.jpg"])
+@pytest.mark.parametrize("name", ["black.png", "white.png", "point.png", "ribbon.png", "large_grey.jpg"])
 def test_a_picture_that_shows_nothing_has_no_card(pictures, capsys, name):
     assert main([str(pictures / name), "--json"]) == 0
     reading = json.loads(capsys.readouterr().out)

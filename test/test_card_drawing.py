@@ -29,7 +29,8 @@ def reading(state="RGPR|GP|"):
 
 
 def test_balls_are_placed_in_the_picture_between_the_cards_corners():
-    homography = cv2.getPerspectiveTransform(np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32), CORNERS.astype(np.float32))
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
+    homography = cv2.getPerspectiveTransform(square, CORNERS.astype(np.float32))
     for state in all_states()[::7]:
         expected = cv2.perspectiveTransform(np.array([[(ball.x, ball.y) for ball in upright_balls(state)]]), homography)[0]
         balls = balls_in_image(reading(state))

@@ -113,8 +113,17 @@ def test_the_loss_of_a_perfect_output_is_nearly_nothing_and_of_a_shifted_one_is_
     assert detection_loss(raw_from(*other), *targets) > 0.1
 
 
+def test_the_learning_rate_starts_anew_in_each_cycle_and_ends_each_near_nothing():
+    plan = TrainingPlan(cycles=((4, 2e-3), (2, 1e-3)))
+    assert plan.epochs == 6
+    assert [plan.rate(epoch) for epoch in (0.0, 4.0)] == [0.0, 0.0]
+    assert plan.rate(0.12) == pytest.approx(2e-3, rel=0.01) and plan.rate(4.06) == pytest.approx(1e-3, rel=0.01)
+    assert plan.rate(2.06) == pytest.approx(1e-3, rel=0.01)
+    assert plan.rate(3.999) < 1e-5 and plan.rate(5.999) < 1e-5
+
+
 def test_a_run_that_is_broken_off_and_resumed_ends_with_the_same_weights(tmp_path, monkeypatch):
-    plan = TrainingPlan(epochs=2, peak_rate=3e-3, samples_per_epoch=2, batch=2, pool=2, validation_samples=1, seed=3)
+    plan = TrainingPlan(cycles=((1, 3e-3), (1, 1e-3)), samples_per_epoch=2, batch=2, pool=2, validation_samples=1, seed=3)
     whole = to_arrays(train(plan, tmp_path / "whole"))
 
     class Broken(Exception):
@@ -138,10 +147,15 @@ def test_a_run_that_is_broken_off_and_resumed_ends_with_the_same_weights(tmp_pat
     assert [line.split(",")[0] for line in log] == ["epoch", "1", "2"]
 
 
-def test_an_impossible_plan_is_refused_in_one_line(tmp_path, capsys):
+@pytest.mark.parametrize("words, expected", [
+    (["--epochs", "0"], "at least 1"),
+    (["--samples", "4", "--batch", "8"], "at least a batch"),
+    (["--seed", "-1"], "seed at least 0"),
+])
+def test_an_impossible_plan_is_refused_in_one_line(tmp_path, capsys, words, expected):
     with pytest.raises(SystemExit) as stop:
-        main(["--out", str(tmp_path), "--epochs", "0"])
-    assert stop.value.code == 2 and "at least 1" in capsys.readouterr().err
+        main(["--out", str(tmp_path), *words])
+    assert stop.value.code == 2 and expected in capsys.readouterr().err
 
 
 def test_overlap_of_square_boxes_is_intersection_over_union():

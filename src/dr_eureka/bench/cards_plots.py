@@ -14,14 +14,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dr_eureka.bench.cards_breakdown import LEAST_RIGHT, breakdown
-from dr_eureka.bench.cards_map import TITLES, Match
+from dr_eureka.bench.cards_map import PAPER_MAP, TITLES, Match
 from dr_eureka.bench.cards_states import Trial
 from dr_eureka.bench.report import share_row
 from dr_eureka.errors import DrEurekaError
 
 _DPI = 110
 _LOG_COLUMNS = ("epoch", "loss", "map50")
-_PAPER_MAP = 0.952
 _COLOURS = {"eureka": "tab:blue", "tiny": "tab:orange"}
 
 
@@ -51,7 +50,7 @@ def plot_training(logs: Mapping[str, Mapping[str, np.ndarray]], file: Path) -> N
     for model, log in logs.items():
         losses.plot(log["epoch"], log["loss"], "o-", ms=3, color=_COLOURS[model], label=TITLES[model])
         maps.plot(log["epoch"], log["map50"], "o-", ms=3, color=_COLOURS[model], label=TITLES[model])
-    maps.axhline(_PAPER_MAP, color="grey", ls=":", label=f"both in the paper, at the end: {_PAPER_MAP}")
+    maps.axhline(PAPER_MAP, color="grey", ls=":", label=f"both in the paper, at the end: {PAPER_MAP}")
     losses.set(xlabel="epoch", ylabel="training loss", yscale="log", title="Loss")
     maps.set(xlabel="epoch", ylabel="mAP@0.5 [share]", ylim=(None, 1.005), title="Mean average precision, validation crops")
     for axes in (losses, maps):

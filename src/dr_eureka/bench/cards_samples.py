@@ -35,7 +35,7 @@ def draw_samples(
         image = scene_of(series, seed, trial.state, trial.view).image
         panels.append(_scene_panel(image, reader.read(image), title, trial.state))
     panels += [np.zeros_like(panels[0])] * (-len(panels) % _COLUMNS)
-    hardest = sorted(range(len(seen)), key=lambda index: len(_sure(seen[index].balls)))
+    hardest = sorted(range(2, len(seen)), key=lambda index: _how_easy(seen[index]))
     panels += [_crop_panel(held_out_crop(seed, index), seen[index]) for index in (0, 1, *hardest[:_COLUMNS - 2])]
     rows = [np.hstack(panels[i:i + _COLUMNS]) for i in range(0, len(panels), _COLUMNS)]
     cv2.imwrite(str(file), cv2.cvtColor(np.vstack(rows), cv2.COLOR_RGB2BGR))
@@ -82,6 +82,12 @@ def _crop_panel(crop: Crop, found: CropDetections) -> np.ndarray:
         place = (int(foot.x * side), int(foot.y * side))
         cv2.drawMarker(image, place, (0, 255, 255), cv2.MARKER_TILTED_CROSS, 16, 2, cv2.LINE_AA)
     return _panel(image, "held-out crop", f"{len(balls)} balls, {len(feet)} feet")
+
+
+def _how_easy(found: CropDetections) -> tuple[int, float]:
+    """Return what orders crops from hard to easy: how many balls were seen, and how sure the least sure one was."""
+    balls = _sure(found.balls)
+    return len(balls), min((ball.confidence for ball in balls), default=0.0)
 
 
 def _sure(things: Iterable[SeenBall | SeenFoot]) -> list:

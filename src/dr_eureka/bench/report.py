@@ -35,7 +35,10 @@ class BenchOptions:
 
 @dataclass(frozen=True)
 class Row:
-    """One figure: value None when it could not be had (the name says why); ok None when there is no goal to judge by."""
+    """One figure: value None when it could not be had (the name says why).
+
+    ok None: there is no goal to judge by, or nothing to judge.
+    """
 
     name: str
     value: float | None
@@ -45,6 +48,11 @@ class Row:
     paper: float | str | None = None
     goal: str | None = None
     ok: bool | None = None
+
+    @property
+    def short(self) -> bool:
+        """Tell whether a goal was missed, or could not be judged for want of a value."""
+        return self.goal is not None and self.value is None if self.ok is None else not self.ok
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the row for JSON, which knows neither NaN nor infinity."""
@@ -120,7 +128,7 @@ def table_lines(rows: Sequence[Row]) -> list[str]:
 def _cells(row: Row) -> tuple[str, ...]:
     interval = "" if row.interval95 is None else f"{number(row.interval95[0])} .. {number(row.interval95[1])}"
     paper = row.paper if isinstance(row.paper, str) else number(row.paper)
-    verdict = {None: "", True: "ok", False: "SHORT"}[row.ok if row.ok is None else bool(row.ok)]
+    verdict = "SHORT" if row.short else "ok" if row.ok else ""
     count = "" if row.n is None else str(row.n)
     return (row.name, number(row.value) or "-", row.unit, count, interval, paper, row.goal or "", verdict)
 

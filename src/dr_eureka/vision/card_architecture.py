@@ -14,10 +14,11 @@ import numpy as np
 import torch
 from torch import nn
 
+from dr_eureka.game.state import COLOURS
+
 INPUT_PX = 416
 GRID = 13
-CLASSES = "RGP"
-FIRST_FOOT = 4 + len(CLASSES)
+FIRST_FOOT = 4 + len(COLOURS)
 # Channels of the raw output: ball confidence, x, y, log diameter, a score a class; foot confidence, x, y.
 RAW_CHANNELS = FIRST_FOOT + 3
 
@@ -33,7 +34,8 @@ class _Block:
 
 _BLOCKS = {
     # 250 thousand parameters; the third and fourth convolutions have stride 2 in place of pooling.
-    "eureka": (_Block(8, pool=2), _Block(16, pool=2), _Block(32, 2), _Block(64, 2), _Block(64, pool=2), _Block(128), _Block(96)),
+    "eureka": (_Block(8, pool=2), _Block(16, pool=2), _Block(32, 2), _Block(64, 2), _Block(64, pool=2), _Block(128),
+               _Block(96)),
     # 11 million: Redmon and Farhadi, YOLO9000 (2017), yolov2-tiny.cfg, with our output layer.
     "tiny": (_Block(16, pool=2), _Block(32, pool=2), _Block(64, pool=2), _Block(128, pool=2), _Block(256, pool=2),
              _Block(512, pool=1), _Block(1024), _Block(512)),

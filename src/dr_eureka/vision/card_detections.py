@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dr_eureka.game.state import COLOURS
+
 _FOOT_SEPARATION = 0.08  # two feet cannot be closer than this share of the crop
 
 
@@ -43,7 +45,6 @@ def collect(
     class_scores: np.ndarray,
     feet: np.ndarray,
     threshold: float,
-    classes: str = "RGP",
 ) -> CropDetections:
     """Return balls and feet above a confidence, with repeats dropped whatever their class (cells share an edge).
 
@@ -56,7 +57,7 @@ def collect(
         x, y, _, kind = (float(v) for v in balls[row, column])
         diameter = float(diameters[row, column])
         if all(np.hypot(x - b.x, y - b.y) > 0.5 * max(diameter, b.diameter) for b in seen_balls):
-            seen_balls.append(SeenBall(x, y, diameter, classes[int(kind)], float(confidence[row, column])))
+            seen_balls.append(SeenBall(x, y, diameter, COLOURS[int(kind)], float(confidence[row, column])))
     seen_feet = []
     for row, column in _strongest_first(feet[..., 2], threshold):
         x, y, sure = (float(v) for v in feet[row, column])

@@ -4,8 +4,8 @@ The paper's way, grey, threshold, contours, four corners, rectify, with three di
 smallest channel, in which balls and bench are as dark as the chalkboard and only what is white is bright. Several
 thresholds are tried, so that no exposure is assumed. And the quadrilateral is the black ground inside the white border,
 whose contrast the card brings along, whatever it lies on. A picture is searched at a fraction of its size, and at its own
-size only if nothing was found: lines fitted to whole sides lose nothing by that. Sizes are compared with the picture and with the quadrilateral
-itself, never with pixels at an assumed camera height.
+size only if nothing was found: lines fitted to whole sides lose nothing by that. Sizes are compared with the picture and
+with the quadrilateral itself, never with pixels at an assumed camera height.
 """
 
 from __future__ import annotations
@@ -142,7 +142,10 @@ def rectify(image: np.ndarray, ground: np.ndarray, side_px: int = CROP_PX) -> tu
 
 
 def coloured_share(crop: np.ndarray) -> float:
-    """Return which share of a crop of any size is plainly coloured, its border taken for white: balls are, markers are not."""
+    """Return which share of a crop of any size is plainly coloured, its border taken for white.
+
+    Balls are, markers are not.
+    """
     small = cv2.resize(crop, (_COARSE_PX, _COARSE_PX), interpolation=cv2.INTER_AREA).astype(np.float32)
     edge = np.concatenate((small[2], small[-3], small[:, 2], small[:, -3]))
     margin = int(1.5 * NOMINAL_BORDER * _COARSE_PX)  # what surrounds the dark ground may have any colour

@@ -50,7 +50,7 @@ def read_layout(seen: CropDetections) -> CardLayout:
     """
     if len(seen.balls) != _BALLS:
         raise LayoutError(f"{len(seen.balls)} balls seen, expected {_BALLS}")
-    fits: list[tuple[CardLayout, bool]] = []
+    fits: list[CardLayout] = []
     reasons = []
     for turn in range(4):
         balls = [turned(ball, turn) for ball in seen.balls]
@@ -61,17 +61,14 @@ def read_layout(seen: CropDetections) -> CardLayout:
             reasons.append(str(error))
             continue
         try:
-            fits.append((CardLayout(State.parse("|".join(tubes)), turn), bool(feet)))
+            fits.append(CardLayout(State.parse("|".join(tubes)), turn))
         except StateError as error:
             raise LayoutError(str(error)) from error
     if not fits:
         raise LayoutError(f"no way up makes sense of the balls; as seen: {reasons[0]}")
-    # A turn that the feet fit was tested harder than one that only the balls allow.
-    by_feet = [layout for layout, on_feet in fits if on_feet]
-    layouts = by_feet or [layout for layout, _ in fits]
-    if len(layouts) > 1:
-        raise LayoutError("which way is up cannot be told: the balls fit " + " and ".join(str(l.state) for l in layouts))
-    return layouts[0]
+    if len(fits) > 1:
+        raise LayoutError("which way is up cannot be told: the balls fit " + " and ".join(str(fit.state) for fit in fits))
+    return fits[0]
 
 
 def turned(thing: SeenBall | SeenFoot, turn: int) -> SeenBall | SeenFoot:

@@ -6,6 +6,7 @@ from typing import Sequence
 
 import numpy as np
 
+from dr_eureka.game.state import COLOURS
 from dr_eureka.vision.card_detections import SeenBall
 
 
@@ -25,10 +26,10 @@ def average_precision(
 ) -> float:
     """Return the area under precision over recall for one colour (all-point, as PASCAL VOC since 2010).
 
-    seen: detections of each image; truth: (n, 4) of each image: x, y, diameter, class index into RGP. NaN when the
+    seen: detections of each image; truth: (n, 4) of each image: x, y, diameter, class index into COLOURS. NaN when the
     colour never occurs.
     """
-    wanted = [t[t[:, 3] == "RGP".index(colour)] for t in truth]
+    wanted = [t[t[:, 3] == COLOURS.index(colour)] for t in truth]
     total = sum(len(w) for w in wanted)
     if total == 0:
         return float("nan")
@@ -54,4 +55,4 @@ def mean_average_precision(
     seen: Sequence[Sequence[SeenBall]], truth: Sequence[np.ndarray], overlap: float = 0.5
 ) -> float:
     """Return the mean of the three colours' average precisions."""
-    return float(np.nanmean([average_precision(seen, truth, colour, overlap) for colour in "RGP"]))
+    return float(np.nanmean([average_precision(seen, truth, colour, overlap) for colour in COLOURS]))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from dr_eureka.game.state import COLOURS
 from dr_eureka.vision.aruco import marker_image
 from dr_eureka.vision.card_finder import rectify
 from dr_eureka.vision.card_renderer import CardDrawing, draw_card
@@ -132,7 +133,7 @@ def rectified_sample(
     """Return a training crop of a card seen at random, cut out as the finder would, in one of four turns.
 
     The crop is (416, 416, 3) uint8 RGB; balls (n, 4) hold x, y, diameter as fractions of the crop and the class index;
-    feet (3, 2) x, y.
+    feet (m, 2) x, y.
     """
     view = sample_view(rng, ranges)
     corners = card_corners(view)
@@ -158,7 +159,7 @@ def rectified_sample(
     for row, ball in zip(balls, drawing.balls):
         rim = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]) * ball.diameter / 2 + (ball.x, ball.y)
         centre, *edges = _apply(to_fractions, rim)
-        row[:] = (*centre, 2 * np.mean(np.linalg.norm(edges - centre, axis=1)), "RGP".index(ball.colour))
+        row[:] = (*centre, 2 * np.mean(np.linalg.norm(edges - centre, axis=1)), COLOURS.index(ball.colour))
     return crop, balls, _apply(to_fractions, drawing.feet)
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 Bands = tuple[tuple[float, float], ...]  # a quantity is drawn evenly from one of these intervals
-LOOKS = ("real", "training", "held_out")
 
 
 @dataclass(frozen=True)

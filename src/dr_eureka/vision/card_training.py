@@ -20,8 +20,9 @@ import numpy as np
 import torch
 
 from dr_eureka.errors import DrEurekaError
+from dr_eureka.game.state import COLOURS
 from dr_eureka.resources import WEIGHTS_FOLDER, resource_path
-from dr_eureka.vision.card_architecture import CLASSES, MODELS, CardDetector, build_network, parameter_count, to_arrays
+from dr_eureka.vision.card_architecture import MODELS, CardDetector, build_network, parameter_count, to_arrays
 from dr_eureka.vision.card_checkpoint import load_checkpoint, save_checkpoint
 from dr_eureka.vision.card_detections import collect
 from dr_eureka.vision.card_metrics import mean_average_precision
@@ -35,10 +36,9 @@ CHECKPOINT = "checkpoint.npz"
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """How long and on what to train."""
+    """How long and on what to train; cycles: epochs and peak learning rate of each (Loshchilov and Hutter, SGDR, 2017)."""
 
-    epochs: int
-    peak_rate: float
+    cycles: tuple[tuple[int, float], ...]
     model: str = "eureka"
     samples_per_epoch: int = 2500
     batch: int = 8
@@ -48,10 +48,25 @@ class TrainingPlan:
     averaging: float = 0.99  # of the weights kept for use, per step
     bfloat16: bool = False
 
+    @property
+    def epochs(self) -> int:
+        return sum(epochs for epochs, _ in self.cycles)
+
+    def rate(self, epoch: float) -> float:
+        """Return the learning rate after so many epochs: in each cycle a short warm-up, then half a cosine down."""
+        for epochs, peak in self.cycles:
+            if epoch < epochs:
+                break
+            epoch -= epochs
+        done, warm_up = epoch / epochs, 0.03
+        if done < warm_up:
+            return peak * done / warm_up
+        return peak * (0.5 * (1 + math.cos(math.pi * (done - warm_up) / (1 - warm_up))) + 1e-3)
+
 
 PLANS = {
-    "eureka": TrainingPlan(epochs=12, peak_rate=3e-3),
-    "tiny": TrainingPlan(epochs=8, peak_rate=1e-3, model="tiny"),
+    "eureka": TrainingPlan(cycles=((12, 3e-3), (6, 1.5e-3))),
+    "tiny": TrainingPlan(cycles=((8, 1e-3),), model="tiny"),
 }
 
 
@@ -70,7 +85,7 @@ def validate(network: CardDetector, samples: list[tuple[np.ndarray, np.ndarray, 
         arrays = [a[0].numpy() for a in (grid.balls, grid.diameters, grid.class_scores, grid.feet)]
         seen.append(collect(*arrays, threshold=0.05).balls)
         sure = collect(*arrays, threshold=0.5)
-        exact += _same([(b.x, b.y, CLASSES.index(b.colour)) for b in sure.balls], balls[:, (0, 1, 3)]) and _same(
+        exact += _same([(b.x, b.y, COLOURS.index(b.colour)) for b in sure.balls], balls[:, (0, 1, 3)]) and _same(
             [(f.x, f.y, 0) for f in sure.feet], np.column_stack((feet, np.zeros(len(feet)))))
     return mean_average_precision(seen, [balls for _, balls, _ in samples]), exact / len(samples)
 
@@ -96,7 +111,7 @@ def train(plan: TrainingPlan, folder: Path) -> CardDetector:
     samples = [held_out.sample() for _ in range(plan.validation_samples)]
     network = build_network(plan.model).to(memory_format=torch.channels_last)
     averaged = copy.deepcopy(network)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=plan.peak_rate, weight_decay=1e-4)
+    optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-4)
     first_epoch = 0
     if checkpoint.exists():
         first_epoch = load_checkpoint(checkpoint, network, averaged, optimiser)
@@ -108,9 +123,8 @@ def train(plan: TrainingPlan, folder: Path) -> CardDetector:
         stream = CardStream(np.random.default_rng((plan.seed, epoch)), plan.pool)
         network.train()
         for step in range(steps):
-            done = (epoch * steps + step) / (plan.epochs * steps)
             for group in optimiser.param_groups:
-                group["lr"] = plan.peak_rate * _rate_factor(done)
+                group["lr"] = plan.rate(epoch + step / steps)
             losses.append(_step(network, optimiser, stream, plan))
             _average(averaged, network, min(plan.averaging, (epoch * steps + step) / (epoch * steps + step + 10)))
             _show_progress(epoch, step + 1, steps, float(np.mean(losses[-50:])))
@@ -138,12 +152,6 @@ def _step(network: CardDetector, optimiser: torch.optim.Optimizer, stream: CardS
     torch.nn.utils.clip_grad_norm_(network.parameters(), 10.0)
     optimiser.step()
     return float(loss.detach())
-
-
-def _rate_factor(done: float) -> float:
-    """Return the learning rate's share of its peak: a short warm-up, then a half cosine down to nothing."""
-    warm_up = 0.03
-    return done / warm_up if done < warm_up else 0.5 * (1 + math.cos(math.pi * (done - warm_up) / (1 - warm_up))) + 1e-3
 
 
 def _average(averaged: torch.nn.Module, network: torch.nn.Module, keep: float) -> None:
@@ -176,7 +184,7 @@ def main(argv: list[str] | None = None) -> int:
                         help="for weights, log and checkpoint; a run that was broken off goes on from there")
     parser.add_argument("--install", action="store_true",
                         help="put the finished weights and their log into the package's config/weights")
-    parser.add_argument("--epochs", type=int)
+    parser.add_argument("--epochs", type=int, help="in one cycle of the learning rate")
     parser.add_argument("--samples", type=int, dest="samples_per_epoch", help="crops an epoch")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--seed", type=int)
@@ -184,10 +192,12 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--bfloat16", action="store_true", default=None,
                         help="multiply in half precision: twice as fast on processors made for it")
     options = vars(parser.parse_args(argv))
-    model, out, install = (options.pop(name) for name in ("model", "out", "install"))
+    model, out, install, epochs = (options.pop(name) for name in ("model", "out", "install", "epochs"))
+    if epochs is not None:
+        options["cycles"] = ((epochs, PLANS[model].cycles[0][1]),)
     plan = replace(PLANS[model], **{name: value for name, value in options.items() if value is not None})
-    if min(plan.epochs, plan.batch, plan.pool) < 1 or plan.samples_per_epoch < plan.batch:
-        parser.error("epochs, batch and pool must be at least 1, and samples at least a batch")
+    if min(plan.epochs, plan.batch, plan.pool) < 1 or plan.samples_per_epoch < plan.batch or plan.seed < 0:
+        parser.error("epochs, batch and pool must be at least 1, samples at least a batch, and the seed at least 0")
     try:
         print(f"{model}: {parameter_count(build_network(model))} parameters, {plan.epochs} epochs, into {out}", flush=True)
         network = train(plan, out)

@@ -38,7 +38,9 @@ def load_detector(model: str, folder: Path | None = None) -> dict[str, np.ndarra
             if kind == "scale":
                 levels = part[f"{name}/{start}/levels"]
                 pieces.setdefault(name, []).append((int(start), levels * scale.reshape(-1, *(1,) * (levels.ndim - 1))))
-    return {name: np.concatenate([piece for _, piece in sorted(found, key=lambda f: f[0])]) for name, found in pieces.items()}
+    return {
+        name: np.concatenate([piece for _, piece in sorted(found, key=lambda f: f[0])]) for name, found in pieces.items()
+    }
 
 
 def save_detector(model: str, arrays: Mapping[str, np.ndarray], folder: Path | None = None) -> list[Path]:

@@ -19,7 +19,7 @@ from dr_eureka.vision.card_finder import (
 from dr_eureka.vision.card_layout import CardLayout, LayoutError, read_layout, turned
 
 SETTINGS_FILE = "config/dr_eureka_main.yaml"
-_SMALLEST_PICTURE_PX = 32
+_SMALLEST_PICTURE_PX = 32  # of the shorter side, as it is searched
 
 
 class CardImageError(DrEurekaError):
@@ -112,9 +112,10 @@ class CardReader:
         if not isinstance(image_rgb, np.ndarray) or image_rgb.dtype != np.uint8 or image_rgb.shape[2:] != (3,):
             found = f"{image_rgb.dtype} {image_rgb.shape}" if isinstance(image_rgb, np.ndarray) else type(image_rgb)
             raise CardImageError(f"picture is {found}, expected uint8 RGB of shape (height, width, 3)")
-        if min(image_rgb.shape[:2]) < _SMALLEST_PICTURE_PX:
+        shortest, longest = sorted(image_rgb.shape[:2])
+        shrink = min(1.0, self._settings.longest_side_px / max(longest, 1))
+        if shortest * shrink < _SMALLEST_PICTURE_PX:
             return CardReading(CardResult.NO_CARD, reason="the picture is too small to hold a card")
-        shrink = min(1.0, self._settings.longest_side_px / max(image_rgb.shape[:2]))
         if shrink < 1.0:
             image_rgb = cv2.resize(image_rgb, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
         candidates = find_candidates(image_rgb, self._settings.finder)
