@@ -15,12 +15,12 @@ from dr_eureka.game.state import START, State
 PACKAGE = Path(__file__).resolve().parent.parent
 
 
-def run(*arguments):
+def run(*arguments, stdout=subprocess.PIPE):
     """Run the executable in a fresh process without a ROS master."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("ROS_")}
     environment["PYTHONPATH"] = str(PACKAGE / "src")
     command = [sys.executable, str(PACKAGE / "scripts" / "plan_game"), *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30)
+    return subprocess.run(command, env=environment, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=30)
 
 
 def test_help_needs_no_master():
@@ -57,6 +57,15 @@ def test_the_json_plan_leads_from_start_to_goal():
         "kind": "pour", "hand": "right", "tube": "right", "target_tube": "left", "target_hand": "left", "count": 1,
     }
     assert len(plan["actions"]) == len(actions_for(plan_pours(START, State.parse("RRP|PG|G"))))
+
+
+def test_a_reader_that_stops_early_ends_it_quietly():
+    """As `plan_game GOAL | head` does; the pipe is closed before anything is written."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    finished = run("RRP|PG|G", stdout=writing)
+    os.close(writing)
+    assert (finished.returncode, finished.stderr) == (0, "")
 
 
 def test_a_goal_that_is_the_start_is_a_plan_of_no_pours(capsys):

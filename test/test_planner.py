@@ -9,7 +9,6 @@ from collections import Counter, deque
 import pytest
 
 from dr_eureka.game.actions import actions_for, separate_actions
-from dr_eureka.game.hands import ReachError
 from dr_eureka.game.planner import plan_pours
 from dr_eureka.game.state import START, State, all_states
 
@@ -95,23 +94,22 @@ def test_plans_from_the_start_are_as_short_as_breadth_first_search_finds(plans_f
 def test_plans_from_other_starts_are_shortest_with_least_handling():
     random_pairs = random.Random(5)
     states = all_states()
-    for _ in range(60):
+    for _ in range(20):
         start, goal = random_pairs.sample(states, 2)
         pours = plan_pours(start, goal)
         assert len(pours) == distances(str(start))[str(goal)]
         assert handling(actions_for(pours)) == least_handling(str(start), str(goal))
 
 
-def test_the_diameter_of_the_graph_is_fourteen():
-    furthest = Counter(distance for state in all_states()[::19] for distance in distances(str(state)).values())
-    assert max(furthest) == 14
-    start, goal = next(
-        (start, goal)
-        for start in map(str, all_states())
-        for goal, distance in distances(start).items()
-        if distance == 14
-    )
-    assert len(plan_pours(State.parse(start), State.parse(goal))) == 14
+def test_the_cards_furthest_apart_take_fourteen_pours():
+    """All distances of the 36 states that `RR|GG|PP` is furthest from; 14 is the published diameter."""
+    from_start = distances(str(START))
+    furthest = [text for text, distance in from_start.items() if distance == 12]
+    lengths = {(text, goal): distance for text in furthest for goal, distance in distances(text).items()}
+    assert max(lengths.values()) == 14
+    for (start, goal), distance in lengths.items():
+        if distance == 14:
+            assert len(plan_pours(State.parse(start), State.parse(goal))) == 14
 
 
 def test_cancelling_leaves_the_least_handling_any_tie_break_can_reach(plans_from_start):
@@ -128,12 +126,6 @@ def test_a_goal_that_is_the_start_needs_no_pour():
 def test_the_same_plan_comes_out_every_time():
     goal = State.parse("GR|PG|RP")
     assert plan_pours(START, goal) == plan_pours(START, goal)
-
-
-def test_hands_that_cannot_take_two_tubes_cannot_play(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with pytest.raises(ReachError, match="left hand: left; right hand: none"):
-        plan_pours(START, State.parse("RRG|G|PP"), reach={"left": ("left",)})
 
 
 def test_a_plan_takes_less_than_a_millisecond():

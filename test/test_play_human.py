@@ -241,7 +241,7 @@ def test_bad_arguments_end_with_one_line_and_code_2(play, tmp_path, monkeypatch,
     assert play("", *arguments) == (2, "", problem)
 
 
-@pytest.mark.parametrize("arguments", [["--cards", "0"], ["--cards", "few"], ["--cards", "2", "--goal", "RR|G|PPG"]])
+@pytest.mark.parametrize("arguments", [["--cards", "0"], ["--cards", "99999999"], ["--cards", "few"], ["--cards", "2", "--goal", "RR|G|PPG"]])
 def test_bad_options_are_refused(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
         main(arguments)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import accumulate, groupby
 from pathlib import Path
-from typing import Any, Optional, Union
+from typing import Any, Union
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -16,7 +16,7 @@ from scipy.linalg import null_space
 from dr_eureka.errors import DrEurekaError
 
 #: Place of a figure under `durations:` in config/planner.yaml, such as ("pick", "from_home", "left", "center").
-Key = tuple[Union[str, int, None], ...]
+Key = tuple[Union[str, int], ...]
 UPRIGHT: Key = ("upright",)
 HOME: Key = ("home",)
 # Between two strategies the robot looks at the tubes; within one, an action begins when the last one ends.
@@ -51,19 +51,18 @@ def read_games(file: Path) -> list[dict[str, Any]]:
     return games
 
 
-def measure(games: Iterable[Mapping[str, Any]]) -> dict[Key, Duration]:
-    """Return the mean durations of what was done in games, by their place in the yaml.
+def measure(games: Iterable[Mapping[str, Any]], method: str) -> dict[Key, Duration]:
+    """Return the mean durations of what was done in games that poured by `method`, by their place in the yaml.
 
     What a game tells as one action may be two: a place right after a pour begins with bringing the tubes upright, a
     strategy's last place ends with the hands at home, a pour begins with bringing the tubes together unless they are. These
     parts are told apart by least squares; those that cannot be told apart are left out. So is a game's last action unless
-    the game was solved, for it may be unfinished, and pours of games that do not say how they poured (`pour`).
+    the game was solved, for it may be unfinished.
     """
     samples: list[tuple[tuple[Key, ...], float]] = []
     for game in games:
-        timed = [action for actions in _strategies(game["actions"]) for action in _timed(actions, game.get("pour"))]
+        timed = [action for actions in _strategies(game["actions"]) for action in _timed(actions, method)]
         samples += timed if game.get("solved") else timed[:-1]
-    samples = [(parts, seconds) for parts, seconds in samples if not any(None in part for part in parts)]
     keys = sorted({part for parts, _ in samples for part in parts}, key=str)
     if not keys:
         return {}
@@ -98,8 +97,8 @@ def _strategies(actions: list[Mapping[str, Any]]) -> Iterator[list[Mapping[str, 
         yield [action for _, action in group]
 
 
-def _timed(actions: list[Mapping[str, Any]], method: Optional[str]) -> Iterator[tuple[tuple[Key, ...], float]]:
-    """Yield of each action what it was made of, and its duration [s]. A pour of an unknown way has a key with None in it."""
+def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[tuple[Key, ...], float]]:
+    """Yield of each action what it was made of, and its duration [s]."""
     placed: set[str] = set()
     before: Mapping[str, Any] = {}
     for action in actions:

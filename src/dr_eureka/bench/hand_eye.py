@@ -17,7 +17,8 @@ from dr_eureka.control.grasp import UP, hand_for_tube, level_hand, tube_in_hand
 from dr_eureka.control.hand_eye import SeenHand, fit_affine, fit_calibration
 from dr_eureka.control.pour_geometry import PourGeometry
 from dr_eureka.control.settings import ControlSettings
-from dr_eureka.game.hands import DEFAULT_REACH, HANDS
+from dr_eureka.game.hands import HANDS
+from dr_eureka.game.planner_settings import load_planner_settings
 from dr_eureka.kinematics.arms import arm_chain
 from dr_eureka.pieces import Pieces, load_pieces
 from dr_eureka.resources import load_yaml
@@ -156,7 +157,7 @@ def _grasp(
     for hand, arm in arms.items():
         yaw = pick.approach_yaw if hand == "left" else -pick.approach_yaw
         rest = arm.posture(bench.control.postures.pick)
-        for tube in sorted(DEFAULT_REACH[hand], key=lambda name: name != "center"):
+        for tube in sorted(load_planner_settings().reach[hand], key=lambda name: name != "center"):
             centre = believed[tube] + pick.grip_height * UP
             over, down = (level_hand(point, yaw, pick.centre_beyond_end) for point in (centre + pick.lift * UP, centre))
             above, there = (arm.solve(rest, pose, EngineCode.UNREACHABLE_TUBE, tube, rest).tolist() for pose in (over, down))

@@ -105,7 +105,7 @@ def _growth_row(hard: Sequence[Contest]) -> Row:
     reach = line.stderr * stats.t.ppf((1 + CONFIDENCE) / 2, len(hard) - 2)
     interval = (float(line.slope - reach), float(line.slope + reach))
     name = f"growth of that from optimum {HARD_FROM} on"
-    return Row(name, float(line.slope), "pours / pour", len(hard), interval, "progressively worse")
+    return Row(name, float(line.slope), "pours / pour", len(hard), interval, "progressively worse", "> 0", line.slope > 0)
 
 
 def _lifts(contest: Contest) -> bool:

@@ -9,17 +9,17 @@ from typing import Any, Mapping, Optional
 
 from dr_eureka.bench.durations import Duration, Key, measure, read_games, rewrite
 from dr_eureka.errors import DrEurekaError
-from dr_eureka.game.planner_settings import PLANNER_FILE
+from dr_eureka.game.planner_settings import PLANNER_FILE, load_planner_settings
 from dr_eureka.resources import load_yaml, resource_path
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command with its arguments (default: the process's) and return its exit code, 2 for bad input."""
-    arguments = _parser().parse_args(argv)
     try:
+        arguments = _parser().parse_args(argv)
         games = [game for file in arguments.games for game in read_games(file)]
         known = load_yaml(PLANNER_FILE)["durations"]
-        measured = {key: duration for key, duration in measure(games).items() if _find(known, key)}
+        measured = {key: duration for key, duration in measure(games, arguments.pour).items() if _find(known, key)}
         print("\n".join(_lines(known, measured)))
         if arguments.write and measured:
             file = resource_path(PLANNER_FILE)
@@ -27,9 +27,6 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     except (DrEurekaError, OSError) as error:
         print(f"measure_durations: {error}", file=sys.stderr)
         return 2
-    nameless = sum(game.get("pour") is None for game in games)
-    if nameless:
-        print(f"measure_durations: {nameless} games do not say how they poured: their pours are left out", file=sys.stderr)
     return 0
 
 
@@ -59,5 +56,7 @@ def _parser() -> argparse.ArgumentParser:
         description=f"Measure in finished games how long picks, places and pours take, beside what {PLANNER_FILE} says.",
     )
     parser.add_argument("games", metavar="GAME", nargs="+", type=Path, help="game.json of a game, or the folder it is in")
+    methods = load_planner_settings().methods
+    parser.add_argument("--pour", choices=methods, default=methods[0], help="how these games poured (default: %(default)s)")
     parser.add_argument("--write", action="store_true", help=f"write what was measured into {PLANNER_FILE}; comments stay")
     return parser

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -10,10 +11,9 @@ from typing import Any, Optional
 
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.actions import actions_for
-from dr_eureka.game.drawing import draw_state
 from dr_eureka.game.planner import STRATEGIES, Plan, Planner, Result
 from dr_eureka.game.planner_settings import load_planner_settings
-from dr_eureka.game.state import START, Pour, State
+from dr_eureka.game.state import START, Pour, State, draw_state
 
 _UNITS = {"fewest": "balls", "fastest": "s", "surest": "s"}
 
@@ -28,10 +28,12 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     except DrEurekaError as error:
         print(f"plan_game: {error}", file=sys.stderr)
         return 2
-    if arguments.json:
-        print(json.dumps(plan_as_mapping(plan, planner)))
-    else:
-        print("\n".join(plan_as_lines(plan, planner)))
+    text = json.dumps(plan_as_mapping(plan, planner)) if arguments.json else "\n".join(plan_as_lines(plan, planner))
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        # `head` and the like stop reading when they have enough; what is left unwritten is not to be tried again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
 
 

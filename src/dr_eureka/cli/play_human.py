@@ -23,6 +23,7 @@ from dr_eureka.game.planner import plan_pours
 from dr_eureka.game.state import START, State, all_states
 
 CARDS = 5
+MOST_CARDS = 1000
 ANY_START = "random"
 INTERRUPTED = 130
 
@@ -249,6 +250,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _count(word: str) -> int:
-    if not word.isdecimal() or int(word) < 1:
-        raise argparse.ArgumentTypeError(f"{word!r} is no whole number from 1 on")
+    if not word.isdecimal() or not 1 <= int(word) <= MOST_CARDS:
+        raise argparse.ArgumentTypeError(f"{word!r} is no whole number from 1 to {MOST_CARDS}")
     return int(word)

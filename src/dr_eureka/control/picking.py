@@ -12,7 +12,7 @@ from dr_eureka.control.grasp import UP, frame_along, hand_for_tube, level_hand, 
 from dr_eureka.control.motion import Follow, Motion, Wait, settled
 from dr_eureka.control.port import grip_joint
 from dr_eureka.control.trajectory import JointTrajectory, MotionLimits
-from dr_eureka.game.hands import DEFAULT_REACH
+from dr_eureka.game.planner_settings import load_planner_settings
 
 
 def _approach_yaw(body: Body, hand: str) -> float:
@@ -94,7 +94,7 @@ def place(body: Body, hand: str, tube: str, foot: np.ndarray) -> Iterator[Motion
     del body.held[hand]
     body.places[tube] = np.array([standing[0], standing[1], foot[2]])
     yield _vertical(body, hand, settings.pick.lift, settings.speeds.move, what)
-    if all(tube in reach for reach in DEFAULT_REACH.values()):
+    if all(tube in reach for reach in load_planner_settings().reach.values()):
         # The other hand may come for it next.
         home = arm.posture(settings.postures.home)
         end = arm.forward(home)

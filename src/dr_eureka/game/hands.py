@@ -11,7 +11,6 @@ HANDS = ("left", "right")
 
 #: Tubes each hand can take from the table.
 Reach = Mapping[str, tuple[str, ...]]
-DEFAULT_REACH: Reach = {"left": ("left", "center"), "right": ("center", "right")}
 
 
 class ReachError(DrEurekaError):

@@ -8,12 +8,12 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
-from dr_eureka.game import pricing, solving, state_graph
+from dr_eureka.game import pricing, solving
 from dr_eureka.game.hands import Reach, ReachError
 from dr_eureka.game.planner_settings import PlannerError, PlannerSettings, load_planner_settings
 from dr_eureka.game.solving import NO_POUR, Prices, Shares, Solution
 from dr_eureka.game.state import TUBE_CAPACITY, Pour, State
-from dr_eureka.game.state_graph import POUR_NUMBERS, POURS
+from dr_eureka.game.state_graph import POUR_NUMBERS, POURS, StateGraph, state_graph
 from dr_eureka.game.tables import cache_folder, load_or_make, table_key
 
 STRATEGIES = ("fewest", "fastest", "surest")
@@ -76,10 +76,10 @@ class Planner:
         self._method = method
         self.reach: Reach = self._settings.reach
         self._seconds = pricing.duration_prices(self._settings, method)
-        self._graph = state_graph.state_graph()
+        self._graph = state_graph()
         prices = pricing.fewest_prices(self.reach) if strategy == "fewest" else self._seconds
         shares = pricing.outcome_shares(self._settings, method) if strategy == "surest" else None
-        self._solution = _solution(prices, shares, cache or cache_folder())
+        self._solution = _solution(self._graph, prices, shares, cache or cache_folder())
 
     def plan(self, start: State, goal: State) -> Plan:
         """Return the best plan if every pour does what it should; where one does not, plan again from what resulted.
@@ -158,33 +158,30 @@ class Planner:
         return graph.goal_class.item(goal_number), graph.recoloured.item(swap, graph.numbers[state])
 
 
-def plan_pours(start: State, goal: State, reach: Optional[Reach] = None) -> tuple[Pour, ...]:
+def plan_pours(start: State, goal: State) -> tuple[Pour, ...]:
     """Return the pours of the `fewest` plan: as few balls as possible, one a pour, then as few picks and places.
-
-    `reach` is the robot's own by default, as config/planner.yaml tells it.
 
     Raises:
         ReachError: when the hands cannot take the tubes that lead to the goal.
     """
-    return _fewest(None if reach is None else tuple(sorted(reach.items()))).pours(start, goal)
+    return _fewest().pours(start, goal)
 
 
-@lru_cache(maxsize=4)
-def _fewest(reach: Optional[tuple[tuple[str, tuple[str, ...]], ...]]) -> Planner:
-    settings = load_planner_settings()
-    return Planner("fewest", settings=settings if reach is None else replace(settings, reach=dict(reach)))
+@lru_cache(maxsize=1)
+def _fewest() -> Planner:
+    return Planner("fewest")
 
 
-def _solution(prices: Prices, shares: Optional[Shares], folder: Optional[Path]) -> Solution:
-    """Return the tables for prices and shares, from the cache folder if the same code has made them there before."""
+def _solution(graph: StateGraph, prices: Prices, shares: Optional[Shares], folder: Optional[Path]) -> Solution:
+    """Return the tables for prices and shares, from the cache folder if the same solver has made them there before."""
     arrays = [getattr(part, field.name) for part in (prices, shares) if part is not None for field in fields(part)]
-    code = [Path(module.__file__).read_bytes() for module in (solving, state_graph)]
+    key = table_key(*arrays, graph.after, graph.representatives, Path(solving.__file__).read_bytes())
 
     def make() -> dict[str, np.ndarray]:
-        solution = vars(solving.solve(state_graph.state_graph(), prices, shares))
+        solution = vars(solving.solve(graph, prices, shares))
         return {name: array for name, array in solution.items() if array is not None}
 
-    return Solution(**{"chance": None, **load_or_make(f"plans-{table_key(*arrays, *code)}", make, folder)})
+    return Solution(**{"chance": None, **load_or_make(f"plans-{key}", make, folder)})
 
 
 def _expect(what: str, word: str, known: tuple[str, ...]) -> None:

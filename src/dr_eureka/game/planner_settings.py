@@ -99,7 +99,8 @@ def load_planner_settings(path: str = PLANNER_FILE) -> PlannerSettings:
         _expect_keys(path, f"durations.pour.{method}", by_count, counts)
         for count, pour in by_count.items():
             if pour.seconds == 0.0:
-                raise SettingsError(path, f"durations.pour.{method}.{count}.seconds", "is 0", "more, or plans never end", 0.0)
+                key = f"durations.pour.{method}.{count}.seconds"
+                raise SettingsError(path, key, "is 0", "more, or plans never end", 0.0)
         _expect_keys(path, f"outcomes.{method}", settings.outcomes[method], counts)
         for held, by_poured in settings.outcomes[method].items():
             _expect_keys(path, f"outcomes.{method}.{held}", by_poured, range(1, held + 1))

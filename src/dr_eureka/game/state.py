@@ -13,6 +13,8 @@ COLOURS = "RGP"
 COLOUR_NAMES = {"R": "red", "G": "green", "P": "purple"}
 BALLS_PER_COLOUR = 2
 TUBE_CAPACITY = 4
+# Of a drawn tube with the room beside it, in characters.
+_COLUMN_WIDTH = 9
 
 
 class StateError(DrEurekaError):
@@ -170,3 +172,12 @@ def all_states() -> tuple[State, ...]:
             for left, center in fillings
         )
     )
+
+
+def draw_state(state: State) -> str:
+    """Draw the three tubes side by side in text, the lowest balls in the lowest line, with the tubes' names below."""
+    levels = range(TUBE_CAPACITY - 1, -1, -1)
+    rows = [[f"| {balls[level : level + 1]:1} |" for balls in state.tubes] for level in levels]
+    rows.append(["+---+"] * len(TUBES))
+    rows.append(list(TUBES))
+    return "\n".join("".join(cell.center(_COLUMN_WIDTH) for cell in row).rstrip() for row in rows)
