@@ -41,8 +41,8 @@ class GameTest(unittest.TestCase):
 
     def test_the_referee_calls_the_game_solved_with_no_ball_lost(self):
         self.assertEqual(
-            {key: self.result[key] for key in ("seed", "start", "goal", "verdict", "solved", "balls_lost")},
-            {"seed": 4, "start": START, "goal": GOAL, "verdict": "SOLVED", "solved": True, "balls_lost": 0},
+            {key: self.result[key] for key in ("seed", "start", "card", "goal", "verdict", "solved", "balls_lost")},
+            {"seed": 4, "start": START, "card": GOAL, "goal": GOAL, "verdict": "SOLVED", "solved": True, "balls_lost": 0},
             self.output,
         )
         last = self.topic("referee")[-1]
@@ -61,8 +61,8 @@ class GameTest(unittest.TestCase):
         phases = [status.phase for status in self.topic("dr_eureka_main/status")]
         expected = [
             GameStatus.LOOKING_FOR_CARD,
-            GameStatus.PLANNING,
             GameStatus.LOOKING_FOR_TUBES,
+            GameStatus.PLANNING,
             GameStatus.PLAYING,
             GameStatus.CHECKING,
             GameStatus.FINISHED,
@@ -85,7 +85,9 @@ class GameTest(unittest.TestCase):
         self.assertIn("REPLAYED", output)
         self.assertEqual(found["card"].state, GOAL)
         self.assertEqual(pours(found["plan"]), pours(self.topic("dr_eureka_main/plan")[-1]))
-        np.testing.assert_allclose(places(found["tubes"]), places(self.topic("dr_eureka_main/tubes")[-1]), atol=0.002)
+        before, after = self.topic("dr_eureka_main/tubes")[0], self.topic("dr_eureka_main/tubes")[-1]
+        self.assertEqual((before.state, after.state, found["tubes"].state), (START, GOAL, START))
+        np.testing.assert_allclose(places(found["tubes"]), places(before), atol=0.002)
 
     def listen(self, found):
         """Keep the newest card, plan and tubes of the replay in `found`; recorded messages have classes of their own."""

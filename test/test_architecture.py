@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "dr_eureka"
 
-FOUNDATION = {"errors", "pieces", "resources", "settings"}
+FOUNDATION = {"errors", "memory", "pieces", "resources", "settings"}
 # Room: the other rooms, or single modules of them, that it may import besides the foundation.
 ALLOWED = {
     "game": set(),
@@ -25,17 +25,18 @@ ALLOWED = {
     "control": {"game", "kinematics"},
     # The simulator prints the sheet and the card with the same pictures that the robot's vision knows.
     "simulation": {"game", "kinematics", "vision.aruco", "vision.camera", "vision.card_renderer", "vision.sheet_renderer"},
+    "printing": {"vision"},
     "behaviour": {"game", "vision", "control"},
     "bags": {"game", "kinematics", "vision", "behaviour"},
     "bench": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
-    "cli": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags", "bench"},
+    "cli": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags", "bench", "printing"},
     "nodes": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
 }
 ROS_MODULES = {"cv_bridge", "genpy", "rosbag", "rosgraph", "roslaunch", "roslib", "rospy", "rostest", "std_srvs", "tf2_ros"}
 # Packages that are needed without being imported: generated messages, and what launch files and commands start.
 STARTED = {"message_runtime", "robot_state_publisher", "roslaunch"}
 DEBIAN_PYTHON = {"cv2": "python3-opencv"}
-ONLY_ON_PYPI = {"pybullet", "pybullet_utils", "rosbags"}
+ONLY_ON_PYPI = {"pybullet", "pybullet_utils", "rosbags", "ruamel"}
 ROS_OF_OURS = {"dr_eureka.msg", "dr_eureka.srv"}
 
 MODULES = {

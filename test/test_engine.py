@@ -47,6 +47,36 @@ class IdealRobot:
         return self.engine.status.state
 
 
+TWO_POURS = [Pour("left", "right", 1), Pour("center", "right", 1)]
+
+
+@pytest.mark.parametrize("put_down", [False, True])
+def test_the_engine_holds_both_tubes_after_a_pour_until_it_is_told_what_to_do(put_down):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    actions = actions_for(TWO_POURS)
+    engine.start(actions, PLACES, BALLS, pause_after_pours=True)
+    while not engine.status.paused:
+        assert engine.status.state == EngineState.BUSY, engine.status
+        robot.cycle()
+    assert actions[engine.status.action_index].kind == "pour"
+    held = engine.body.held_poses()
+    assert sorted(held) == ["left", "right"]
+    assert held["right"][2, 2] > 0.9 and abs(held["left"][2, 2]) < 0.3
+    for _ in range(100):
+        robot.cycle()
+    np.testing.assert_allclose([engine.body.held_poses()[name] for name in held], list(held.values()), atol=1e-6)
+    engine.go_on(put_down)
+    with pytest.raises(ControlError, match="no pour waits"):
+        engine.go_on(put_down)
+    assert robot.run() == EngineState.DONE, engine.status
+    assert not engine.status.paused and not engine.body.held
+    pours = [actions[index].kind for index, _, _ in engine.durations].count("pour")
+    assert pours == (1 if put_down else 2)
+    for tube, foot in PLACES.items():
+        assert engine.body.places[tube] == pytest.approx(foot, abs=1e-3)
+
+
 @pytest.mark.parametrize("method", ["lock", "direct"])
 @pytest.mark.parametrize("source, target", [("left", "right"), ("center", "left"), ("right", "center")])
 def test_a_pour_between_any_two_tubes_runs_to_its_end_and_puts_both_back(method, source, target):

@@ -7,9 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from dr_eureka.behaviour.card_confirmation import ConfirmCode
 from dr_eureka.behaviour.flow_settings import FlowSettings
-from dr_eureka.behaviour.game_flow import GameFlow, Looks, pours_until_look
-from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Frame, Gaze, Observation
+from dr_eureka.behaviour.game_flow import GameFlow
+from dr_eureka.behaviour.looks import BallLost, Looks
+from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Frame, Gaze, ImageHeader, Observation
+from dr_eureka.behaviour.plan_parts import next_part
 from dr_eureka.behaviour.report import GameCode, Phase
 from dr_eureka.control.codes import EngineCode, EngineState
 from dr_eureka.game.planner import plan_pours
@@ -18,10 +21,14 @@ from dr_eureka.game.state import START, TUBES, Pour, State
 CARD_GAZE, SHEET_GAZE, WATCH_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87), Gaze(0.0, 0.4)
 SETTINGS = FlowSettings(
     engine_limit=10.0,
+    held_limit=1.0,
+    held_images=2,
     engine_silence=3.0,
     camera_limit=5.0,
+    frozen_limit=2.0,
     head_limit=4.0,
     card_limit=20.0,
+    confirm_limit=30.0,
     tubes_limit=20.0,
     check_limit=20.0,
     pours_per_look=3,
@@ -53,10 +60,13 @@ class FakeLook:
 class World:
     """A robot that obeys at once, a camera, clocks, and a record of what the flow tells."""
 
-    def __init__(self, goal=None, games=1, cards=("R|GG|PPR",), robot=True, settings=SETTINGS, results=()):
+    def __init__(self, goal=None, games=1, cards=("R|GG|PPR",), robot=True, settings=SETTINGS, results=(),
+                 confirm_card=False, start=START):
+        self.present = start
         self.cards = list(cards)
         self.results = list(results)
         self.reports, self.plans, self.found_cards, self.found_tubes = [], [], [], []
+        self.confirmations, self.surprises, self.answers = [], [], []
         self.gazes, self.strategies, self.stops = [], [], 0
         self.answer = EngineCode.OK
         self.now = Observation(
@@ -69,8 +79,8 @@ class World:
         self.frames = True
         self.engine_speaks = True
         self.flow = GameFlow(
-            settings, START, goal, games, "lock", Looks(self.card_look, self.tube_look, self.result_look), self,
-            self if robot else None,
+            settings, goal, games, plan_pours, "lock", Looks(self.card_look, self.tube_look, self.read_held), self,
+            self if robot else None, confirm_card,
         )
 
     def card_look(self):
@@ -78,11 +88,34 @@ class World:
         return FakeLook(SimpleNamespace(state=State.parse(state)) if state else None, GameCode.NO_CARD)
 
     def tube_look(self):
-        return FakeLook(SimpleNamespace(tubes=PLACES), GameCode.NO_TUBES)
+        """See what the tubes hold: after pours the next of `results`, or what the pours should have led to."""
+        seen = str(self.present)
+        if self.flow.report().phase == Phase.PLAYING:
+            seen = self.results.pop(0) if self.results else str(reduce(State.after, self.part_pours(), self.present))
+        if not seen:
+            return FakeLook(None, GameCode.NO_CONTENTS)
+        if seen == "ball gone":
+            return FakeLook(BallLost("red seen"), GameCode.NO_CONTENTS)
+        self.present = State.parse(seen)
+        return FakeLook(SimpleNamespace(tubes=PLACES, state=self.present), GameCode.NO_TUBES)
 
-    def result_look(self):
-        state = self.results.pop(0) if self.results else self.flow.report().goal
-        return FakeLook(SimpleNamespace(tubes=PLACES, state=State.parse(state)) if state else None, GameCode.UNCHECKED)
+    def read_held(self, frame, held):
+        """See in the hands what the world says; of other tubes nothing."""
+        return SimpleNamespace(tubes={name: SimpleNamespace(colours=self.in_hands[name]) for name in held})
+
+    def pause(self, action_index, **in_hands):
+        """Let the engine pause after a pour, with these balls in the tubes that it holds."""
+        self.in_hands = in_hands
+        held = dict.fromkeys(in_hands, np.eye(4))
+        self.engine(EngineState.BUSY, strategy_id=len(self.strategies), action_index=action_index)
+        self.now = replace(self.now, engine=replace(self.now.engine, held=held))
+
+    def go_on(self, put_down):
+        self.answers.append(put_down)
+        return Answer(EngineCode.OK, "fake")
+
+    def part_pours(self):
+        return [Pour(action.tube, action.target_tube, action.count) for action in self.strategies[-1][0] if action.kind == "pour"]
 
     def look_at(self, gaze, duration_s):
         self.gazes.append(gaze)
@@ -106,18 +139,24 @@ class World:
     def on_card(self, finding):
         self.found_cards.append(str(finding.state))
 
+    def on_confirmation(self, card, goal):
+        self.confirmations.append((str(card), str(goal)))
+
     def on_plan(self, start, goal, pours, actions):
         self.plans.append((str(start), str(goal), len(pours), actions))
 
     def on_tubes(self, finding):
         self.found_tubes.append(finding.tubes)
 
+    def on_surprise(self, expected, seen):
+        self.surprises.append((str(expected), str(seen)))
+
     def on_report(self, report):
         self.reports.append(report)
 
     def step(self, seconds=0.1):
         robot_s, wall_s = self.now.robot_s + seconds, self.now.wall_s + seconds
-        frame = Frame(robot_s, np.zeros((4, 4, 3), np.uint8), None, np.eye(4)) if self.frames else None
+        frame = Frame(ImageHeader(round(robot_s * 1e9), "cam"), np.zeros((4, 4, 3), np.uint8), None, np.eye(4)) if self.frames else None
         engine = self.now.engine
         if engine and self.engine_speaks:
             engine = replace(engine, heard_wall_s=wall_s)
@@ -160,8 +199,8 @@ def test_a_game_goes_from_card_to_plan_to_tubes_to_the_last_action():
     assert world.flow.over
     assert world.gazes == [CARD_GAZE, SHEET_GAZE, WATCH_GAZE, SHEET_GAZE]
     assert world.phases == [
-        Phase.WAITING_FOR_ENGINE, Phase.WAITING_FOR_CAMERA, Phase.LOOKING_FOR_CARD, Phase.PLANNING,
-        Phase.LOOKING_FOR_TUBES, Phase.PLAYING, Phase.CHECKING, Phase.FINISHED,
+        Phase.WAITING_FOR_ENGINE, Phase.WAITING_FOR_CAMERA, Phase.LOOKING_FOR_CARD, Phase.LOOKING_FOR_TUBES,
+        Phase.PLANNING, Phase.PLAYING, Phase.CHECKING, Phase.FINISHED,
     ]
 
 
@@ -186,7 +225,22 @@ def test_a_given_goal_is_played_without_looking_for_a_card():
     assert Phase.LOOKING_FOR_CARD not in world.phases
 
 
-def test_a_goal_equal_to_the_start_is_solved_without_a_motion():
+def test_the_plan_begins_with_what_is_seen_in_the_tubes():
+    world = World(goal=GOAL, start=State.parse("|GG|PPRR"))
+    world.until_playing()
+    assert world.flow.report().start == "|GG|PPRR"
+    assert world.plans[0][:3] == ("|GG|PPRR", "R|GG|PPR", 1)
+    assert world.strategies[0][2] == {"left": 0, "center": 2, "right": 4}
+
+
+def test_until_the_tubes_are_seen_the_start_is_not_known():
+    world = World()
+    assert world.until(Phase.LOOKING_FOR_TUBES).start == ""
+    world.until_playing()
+    assert world.flow.report().start == "RR|GG|PP"
+
+
+def test_a_goal_that_the_tubes_hold_already_is_solved_without_a_motion_of_the_arms():
     world = World(goal=START)
     report = world.until(Phase.FINISHED)
     assert (report.code, report.actions, world.strategies) == (GameCode.SOLVED, (), [])
@@ -204,6 +258,7 @@ def test_a_pour_that_went_wrong_is_seen_and_the_rest_planned_anew():
     world = World(goal=GOAL, results=["RR|GG|PP", "R|GGR|PP"])
     world.until_playing()
     finish(world)
+    assert world.surprises == [("R|GG|PPR", "RR|GG|PP")]
     assert world.flow.report().replans == 1
     assert world.plans[1][:3] == ("RR|GG|PP", "R|GG|PPR", 1)
     world.until_playing()
@@ -218,14 +273,95 @@ def test_a_pour_that_went_wrong_is_seen_and_the_rest_planned_anew():
     assert len(report.pours) == 1 + 1 + world.plans[2][2]
 
 
+def world_in_pause(**in_hands):
+    """Return a game of three pours whose engine pauses after the first, left to right, and the steps it took to answer."""
+    world = World(goal=State.parse("R|G|PPRG"), results=[])
+    world.until_playing()
+    pours = world.part_pours()
+    assert len(pours) > 1
+    first = next(index for index, action in enumerate(world.strategies[0][0]) if action.kind == "pour")
+    assert not world.flow.looking
+    world.pause(first, **in_hands)
+    return world, pours
+
+
+def test_tubes_in_the_hands_are_looked_at_after_a_pour_and_what_is_right_goes_on():
+    after = START.after(plan_pours(START, State.parse("R|G|PPRG"))[0])
+    world, pours = world_in_pause(**{tube: after.tube(tube) for tube in (pours_tubes(START, "R|G|PPRG"))})
+    world.step()
+    assert world.flow.looking and world.answers == []
+    for _ in range(5):
+        world.step()
+    assert world.answers == [False] and not world.flow.looking
+    assert world.flow.report().pours == tuple(pours)
+    pour = world.flow.report().actions[-1]
+    assert pour.action.kind == "pour" and pour.end_s < world.flow.report().robot_seconds - 0.3
+    paused = world.now.engine.action_index
+    world.engine(EngineState.BUSY, action_index=paused + 1)
+    world.step()
+    assert world.flow.report().actions[paused] == pour
+    assert world.flow.report().actions[paused + 1].start_s == pytest.approx(world.flow.report().robot_seconds)
+
+
+def test_a_pour_that_is_seen_in_the_hands_to_have_gone_wrong_ends_the_part():
+    tubes = pours_tubes(START, "R|G|PPRG")
+    world, pours = world_in_pause(**{tube: START.tube(tube) for tube in tubes})
+    for _ in range(5):
+        world.step()
+    assert world.answers == [True]
+    assert world.flow.report().pours == tuple(pours[:1])
+    world.results = [str(START)]
+    finish(world)
+    assert (world.flow.report().replans, world.plans[-1][:2]) == (1, ("RR|GG|PP", "R|G|PPRG"))
+
+
+def test_a_false_alarm_about_tubes_in_the_hands_costs_no_new_plan():
+    tubes = pours_tubes(START, "R|G|PPRG")
+    world, pours = world_in_pause(**{tube: START.tube(tube) for tube in tubes})
+    for _ in range(5):
+        world.step()
+    world.results = [str(START.after(pours[0]))]
+    finish(world)
+    assert (world.flow.report().replans, len(world.plans)) == (0, 1)
+    world.until_playing()
+    assert world.part_pours() == pours[1:]
+
+
+def test_what_the_fingers_hide_is_taken_for_right():
+    after = START.after(plan_pours(START, State.parse("R|G|PPRG"))[0])
+    hidden = {tube: "?" * min(2, len(after.tube(tube))) + after.tube(tube)[2:] for tube in pours_tubes(START, "R|G|PPRG")}
+    world, _ = world_in_pause(**hidden)
+    for _ in range(5):
+        world.step()
+    assert world.answers == [False]
+
+
+def test_hands_of_which_no_image_comes_are_taken_for_right_at_the_limit():
+    world, _ = world_in_pause(**dict.fromkeys(pours_tubes(START, "R|G|PPRG"), ""))
+    world.frames = False
+    for _ in range(9):
+        world.step()
+    assert world.answers == []
+    for _ in range(5):
+        world.step()
+    assert world.answers == [False]
+
+
+def pours_tubes(start, goal):
+    """Return the two tubes of the first pour from a state to another."""
+    first = plan_pours(start, State.parse(goal))[0]
+    return first.source, first.target
+
+
 def test_a_long_plan_is_carried_out_in_parts_with_a_look_after_each():
     goal = State.parse("PR|PRG|G")
     whole = plan_pours(START, goal)
-    middle = reduce(State.after, whole[: pours_until_look(whole, 3)], START)
+    part = next_part(START, whole, 3)
+    middle = part.expected
     world = World(goal=goal, results=[str(middle)])
     world.until_playing()
     first = world.strategies[0][0]
-    assert sum(action.kind == "pour" for action in first) == pours_until_look(whole, 3) < len(whole)
+    assert sum(action.kind == "pour" for action in first) == len(part.pours) < len(whole)
     assert [action.kind for action in first].count("pick") == [action.kind for action in first].count("place")
     finish(world)
     assert (world.flow.report().phase, world.flow.report().replans) == (Phase.PLAYING, 0)
@@ -237,7 +373,7 @@ def test_a_long_plan_is_carried_out_in_parts_with_a_look_after_each():
 @pytest.mark.parametrize("least, count", [(1, 2), (2, 2), (3, 3), (4, 5), (9, 5)])
 def test_a_look_waits_while_the_same_two_tubes_are_poured(least, count):
     pours = [Pour("left", "right"), Pour("right", "left"), Pour("left", "center"), Pour("center", "right"), Pour("center", "right")]
-    assert pours_until_look(pours, least) == count
+    assert next_part(START, pours, least).pours == tuple(pours[:count])
 
 
 def test_a_game_that_no_new_plan_saves_is_not_solved():
@@ -257,6 +393,106 @@ def test_tubes_that_cannot_be_read_leave_a_finished_game_unchecked():
     report = world.flow.report()
     assert (report.phase, report.code) == (Phase.FINISHED, GameCode.UNCHECKED)
     assert "images within 20 s" in report.message
+
+
+def test_tubes_that_cannot_be_read_before_the_last_pour_end_the_game():
+    world = World(goal=State.parse("PR|PRG|G"), results=[""])
+    world.until_playing()
+    finish(world)
+    report = world.flow.report()
+    assert (report.phase, report.code) == (Phase.FAILED, GameCode.NO_CONTENTS)
+
+
+@pytest.mark.parametrize("goal", ["R|GG|PPR", "PR|PRG|G"])
+def test_a_ball_lost_by_a_pour_ends_the_game(goal):
+    world = World(goal=State.parse(goal), results=["ball gone"], games=2)
+    world.until_playing()
+    finish(world)
+    report = world.flow.report()
+    assert (report.phase, report.code, report.message) == (Phase.FAILED, GameCode.BALL_LOST, "red seen")
+    assert world.flow.over and len(world.strategies) == 1
+
+
+def waiting_for_confirmation(**arguments):
+    world = World(confirm_card=True, **arguments)
+    report = world.until(Phase.WAITING_FOR_CONFIRMATION)
+    assert (report.card, report.goal) == ("R|GG|PPR", "")
+    assert "read as R|GG|PPR" in report.message
+    return world
+
+
+def test_nothing_goes_on_before_a_person_has_confirmed_the_card():
+    world = waiting_for_confirmation()
+    for _ in range(100):
+        assert world.step().phase == Phase.WAITING_FOR_CONFIRMATION
+    assert (world.gazes, world.plans) == ([CARD_GAZE], [])
+    answer = world.flow.confirm_card("")
+    assert (answer.code, answer.message) == (ConfirmCode.OK, "the goal is R|GG|PPR, confirmed")
+    world.until_playing()
+    report = world.flow.report()
+    assert (report.card, report.goal, world.confirmations) == ("R|GG|PPR", "R|GG|PPR", [("R|GG|PPR", "R|GG|PPR")])
+
+
+def test_a_corrected_card_is_played_and_what_was_read_is_kept():
+    world = waiting_for_confirmation()
+    answer = world.flow.confirm_card(" |GGR|PPR ")
+    assert (answer.code, answer.message) == (ConfirmCode.OK, "the goal is |GGR|PPR, corrected from R|GG|PPR")
+    world.until_playing()
+    assert world.plans[0][:2] == ("RR|GG|PP", "|GGR|PPR")
+    finish(world)
+    report = world.flow.report()
+    assert (report.card, report.goal, report.code) == ("R|GG|PPR", "|GGR|PPR", GameCode.SOLVED)
+    assert world.confirmations == [("R|GG|PPR", "|GGR|PPR")]
+
+
+@pytest.mark.parametrize("text", ["RRR|GG|PP", "yes", "R|GG", "|||"])
+def test_a_correction_that_is_no_state_changes_nothing(text):
+    world = waiting_for_confirmation()
+    answer = world.flow.confirm_card(text)
+    assert answer.code == ConfirmCode.WRONG_STATE
+    assert "still waiting: the card was read as R|GG|PPR" in answer.message and "\n" not in answer.message
+    assert world.step().phase == Phase.WAITING_FOR_CONFIRMATION
+    assert world.flow.confirm_card("").code == ConfirmCode.OK
+
+
+def test_only_a_card_that_waits_can_be_confirmed_and_only_once():
+    world = World(confirm_card=True)
+    world.until(Phase.LOOKING_FOR_CARD)
+    answer = world.flow.confirm_card("RRGG||PP")
+    assert (answer.code, answer.message) == (
+        ConfirmCode.NOT_WAITING, "no card waits for confirmation: the game is LOOKING_FOR_CARD",
+    )
+    world.until(Phase.WAITING_FOR_CONFIRMATION)
+    assert [world.flow.confirm_card(text).code for text in ("", "RRGG||PP")] == [ConfirmCode.OK, ConfirmCode.NOT_WAITING]
+    world.until_playing()
+    assert world.flow.report().goal == "R|GG|PPR"
+
+
+def test_a_card_that_nobody_confirms_ends_the_game_with_what_it_waited_for():
+    world = waiting_for_confirmation()
+    report = world.until(Phase.FAILED)
+    assert (report.code, report.card, report.goal) == (GameCode.NOT_CONFIRMED, "R|GG|PPR", "")
+    assert report.message == "nobody confirmed or corrected the card, read as R|GG|PPR, within 30 s"
+    assert world.strategies == []
+
+
+def test_neither_a_given_goal_nor_a_replay_waits_for_a_person():
+    world = World(goal=GOAL, confirm_card=True)
+    world.until_playing()
+    replay = World(robot=False, confirm_card=True)
+    replay.until(Phase.FINISHED)
+    assert Phase.WAITING_FOR_CONFIRMATION not in world.phases + replay.phases
+
+
+def test_each_card_of_several_games_is_confirmed():
+    world = waiting_for_confirmation(games=2, cards=("R|GG|PPR", "|GGR|PPR"))
+    world.flow.confirm_card("")
+    world.until_playing()
+    finish(world)
+    world.until(Phase.WAITING_FOR_CONFIRMATION)
+    assert world.flow.report().card == "|GGR|PPR"
+    world.flow.confirm_card("")
+    world.until_playing()
 
 
 def test_each_game_starts_where_the_last_one_ended():
@@ -344,6 +580,19 @@ def no_image_while_looking(world):
     world.frames = False
 
 
+def camera_frozen(world):
+    world.frames = False
+    problem = "image of 7.300 s repeats the one before pixel by pixel"
+    world.now = replace(world.now, camera_frozen=True, camera_problem=problem)
+
+
+def camera_frozen_after_the_pours(world):
+    world.until_playing()
+    world.engine(EngineState.DONE, action_index=0)
+    world.until(Phase.CHECKING)
+    camera_frozen(world)
+
+
 def head_stuck_before_the_pours(world):
     world.until(Phase.LOOKING_FOR_TUBES)
     head_stuck(world)
@@ -351,6 +600,14 @@ def head_stuck_before_the_pours(world):
 
 def head_stuck(world):
     world.look_at = lambda gaze, duration_s: Answer(EngineCode.OK)
+
+
+def unreadable_tubes(world):
+    world.present = ""
+
+
+def ball_beside_the_tubes(world):
+    world.present = "ball gone"
 
 
 def no_card(world):
@@ -376,8 +633,12 @@ def engine_dies(world):
         (no_engine, GameCode.NO_ENGINE, "no status of control_engine within 10 s"),
         (no_image_ever, GameCode.NO_CAMERA, "no image on camera/image_raw within 5 s"),
         (no_image_while_looking, GameCode.NO_CAMERA, "no image within 5 s"),
+        (camera_frozen, GameCode.CAMERA_FROZEN, "nothing new from the camera for 2 s: image of 7.300 s repeats the one before"),
+        (camera_frozen_after_the_pours, GameCode.CAMERA_FROZEN, "nothing new from the camera for 2 s"),
         (head_stuck, GameCode.HEAD_NOT_STILL, "after 4 s"),
         (head_stuck_before_the_pours, GameCode.HEAD_NOT_STILL, "head_p=0.4"),
+        (unreadable_tubes, GameCode.NO_CONTENTS, "images within 20 s"),
+        (ball_beside_the_tubes, GameCode.BALL_LOST, "red seen"),
         (no_card, GameCode.NO_CARD, "images within 20 s"),
         (engine_refuses, GameCode.ENGINE_REFUSED, "control_engine: BUSY: fake"),
         (engine_hangs, GameCode.ENGINE_LOST, "fake"),

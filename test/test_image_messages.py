@@ -60,9 +60,14 @@ def test_a_jpeg_comes_back_with_its_colours():
     assert np.abs(decoded - smooth)[:, [8, 56]].max() < 8
 
 
-@pytest.mark.parametrize("data", [b"", b"no image at all"])
-def test_a_compressed_image_that_is_none_is_refused(data):
-    with pytest.raises(ImageError, match="cannot be decoded"):
+PACKED = compressed_from_rgb(RGB, STAMP, "cam_link", quality=95).data
+
+
+@pytest.mark.parametrize(
+    "data, words", [(b"", "no picture"), (b"no image at all", "no picture"), (PACKED[:-2], "cut off"), (PACKED[:100], "cut off")]
+)
+def test_a_compressed_image_that_is_none_or_cut_off_is_refused(data, words):
+    with pytest.raises(ImageError, match=f"of format 'jpeg': .*{words}"):
         rgb_from_compressed(CompressedImage(format="jpeg", data=data))
 
 

@@ -70,9 +70,17 @@ def card_picture():
     return picture
 
 
+def flickering(rgb, count):
+    """Return pictures that differ in a corner, even as JPEG: no two of a living camera are alike."""
+    pictures = np.repeat(rgb[None], count, axis=0)
+    for number, picture in enumerate(pictures):
+        picture[-16:, -16:] = 20 * number
+    return list(pictures)
+
+
 def game_topics(tube_pictures, namespace="", card=True, make_image=image, topic="camera/image_raw"):
     """A recorded beginning of a game at 10 Hz: two images of nothing, six of the card, then the sheet."""
-    first = [PLAIN] * 2 + [card_picture() if card else PLAIN] * 6
+    first = flickering(PLAIN, 2) + flickering(card_picture() if card else PLAIN, 6)
     images = [make_image(100.0 + 0.1 * step, rgb) for step, rgb in enumerate(first)]
     images += [make_image(102.0 + 0.1 * step, rgb) for step, rgb in enumerate(tube_pictures)]
     return {
@@ -121,13 +129,23 @@ def test_tubes_seen_before_the_card_are_looked_for_again(tmp_path, no_weights, t
     moved = RobotScene(sheet=(0.47, 0.0, 0.0), noise=2.0)
     before = draw(moved, load_pieces(), CAMERA)
     topics = game_topics(tube_pictures)
-    topics["/camera/image_raw"] = [image(90.0 + 0.1 * step, before) for step in range(6)] + topics["/camera/image_raw"]
+    topics["/camera/image_raw"] = [
+        image(90.0 + 0.1 * step, rgb) for step, rgb in enumerate(flickering(before, 6))
+    ] + topics["/camera/image_raw"]
     topics["/robotis/present_joint_states"] = head_states(89.0, 91.0, SHEET_PITCH) + topics["/robotis/present_joint_states"]
     with Recording(write_bag(tmp_path / "a.bag", topics)) as recording:
         settings = ReplaySettings.load()
         camera = RecordedCamera(recording, settings.stillness)
         sighting = replay(camera, CardInTheCorner(), load_pieces(), settings)
     np.testing.assert_allclose(sighting.tubes.tubes["left"].position, tubes_scene.tubes_in_base[0], atol=0.003)
+
+
+def test_a_recording_of_a_frozen_camera_shows_no_card(tmp_path, capsys, no_weights, tube_pictures):
+    topics = game_topics(tube_pictures)
+    topics["/camera/image_raw"] = [image(100.0 + 0.1 * step, card_picture()) for step in range(20)]
+    seen = run(capsys, write_bag(tmp_path / "a.bag", topics))
+    assert (seen["images"], seen["card"]["state"]) == (20, None)
+    assert "1 RG|PG|RP, expected 5 alike" in seen["card"]["reason"]
 
 
 def test_without_joint_states_the_card_is_read_and_the_reason_is_named(tmp_path, capsys, no_weights, tube_pictures):

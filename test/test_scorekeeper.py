@@ -9,16 +9,17 @@ from dr_eureka.behaviour.scorecard import Ruling, Scorecard
 from dr_eureka.game.actions import Action
 from dr_eureka.game.state import TUBES, Pour
 
-KEYS = {"seed", "start", "goal", "verdict", "solved", "balls_lost", "pours", "replans", "simulated_seconds", "wall_seconds", "actions"}
+KEYS = {"seed", "start", "card", "goal", "verdict", "solved", "balls_lost", "pours", "replans", "simulated_seconds", "wall_seconds",
+        "actions"}
 
 
-def report(game=0, games=1, start="RR|GG|PP", goal="R|GG|PPR", code=GameCode.SOLVED):
+def report(game=0, games=1, start="RR|GG|PP", goal="R|GG|PPR", code=GameCode.SOLVED, card="R|GG|PPR"):
     actions = (
         ActionRecord(Action("pick", "left", "left"), 3.2, 9.0),
         ActionRecord(Action("pour", "left", "left", "right", "right", 1), 9.0, 15.51234),
     )
     phase = Phase.FINISHED if code == GameCode.SOLVED else Phase.FAILED
-    return GameReport(phase, code, game, games, start, goal, (Pour("left", "right"),), actions, 0, 31.25, 12.5, "")
+    return GameReport(phase, code, game, games, start, card, goal, (Pour("left", "right"),), actions, 0, 31.25, 12.5, "")
 
 
 def ruling(state="R|GG|PPR", balls_lost=0, standing=TUBES):
@@ -61,9 +62,16 @@ def test_solved_and_balls_lost_are_the_referees_not_the_robots(seen, solved, los
     assert (written(card)["solved"], written(card)["balls_lost"], written(card)["verdict"]) == (solved, lost, "SOLVED")
 
 
+def test_a_corrected_card_is_told_from_the_goal():
+    card = Scorecard(seed=1)
+    card.add(report(card="R|GP|PGR"), ruling())
+    assert (written(card)["card"], written(card)["goal"], written(card)["solved"]) == ("R|GP|PGR", "R|GG|PPR", True)
+
+
 def test_a_game_that_failed_before_its_goal_was_known_has_none():
     card = Scorecard(seed=1)
-    card.add(report(goal="", code=GameCode.NO_CARD), ruling(state="RR|GG|PP"))
+    card.add(report(card="", goal="", code=GameCode.NO_CARD), ruling(state="RR|GG|PP"))
+    assert written(card)["card"] is None
     assert (written(card)["goal"], written(card)["verdict"], written(card)["solved"]) == (None, "NO_CARD", False)
 
 

@@ -10,6 +10,7 @@ from dr_eureka.vision.voting import (
     UNDECIDED,
     CardVote,
     CardVoteSettings,
+    RepeatedPictures,
     TubeVote,
     TubeVoteSettings,
     VoteSettings,
@@ -45,6 +46,15 @@ def decisions(vote, readings):
 
 def positions(found):
     return np.array([found.tubes[name].position for name in NAMES])
+
+
+def test_a_picture_repeats_the_last_only_if_every_pixel_does():
+    pictures = RepeatedPictures()
+    first = np.full((48, 64, 3), 90, np.uint8)
+    other = first.copy()
+    other[47, 63, 2] += 1
+    shown = [first, first.copy(), other, first, first[:47], first[:47].copy(), np.zeros((1, 1, 3), np.uint8)]
+    assert [pictures.add(picture) for picture in shown] == [False, True, False, False, False, True, False]
 
 
 def test_a_card_wins_with_the_image_that_completes_its_majority():
@@ -155,7 +165,9 @@ def test_votes_are_built_from_the_game_nodes_settings():
         "card": {"window": 3, "agree": 2},
         "tubes": {"window": 4, "agree": 2, "tolerance_m": 0.01},
         "contents": {"window": 5, "agree": 3},
+        "lost": {"window": 5, "agree": 4},
     }
     settings = build(VoteSettings, votes)
+    assert settings.lost == CardVoteSettings(window=5, agree=4)
     assert settings.card == CardVoteSettings(window=3, agree=2)
     assert settings.tubes == TubeVoteSettings(4, 2, 0.01)

@@ -11,6 +11,7 @@ import numpy as np
 
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.vision.camera import CameraError, CameraModel
+from dr_eureka.vision.pictures import PictureError, decode_picture
 
 LARGEST_SIDE_PX = 8192
 _CHANNELS = {"rgb8": 3, "bgr8": 3, "mono8": 1}
@@ -49,13 +50,12 @@ def rgb_from_compressed(message: Any) -> np.ndarray:
     """Return (height, width, 3) uint8 rgb from a sensor_msgs/CompressedImage, jpeg or png.
 
     Raises:
-        ImageError: when the bytes are no picture OpenCV can decode.
+        ImageError: when the bytes are no whole picture that can be decoded.
     """
-    data = np.frombuffer(message.data, np.uint8)
-    bgr = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-    if bgr is None:
-        raise ImageError(f"compressed image of format {message.format!r} with {data.size} bytes cannot be decoded")
-    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    try:
+        return decode_picture(bytes(message.data))
+    except PictureError as error:
+        raise ImageError(f"compressed image of format {message.format!r}: {error}") from error
 
 
 def camera_from_info(message: Any) -> CameraModel:

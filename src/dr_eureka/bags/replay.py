@@ -12,7 +12,7 @@ from dr_eureka.resources import load_yaml
 from dr_eureka.settings import build
 from dr_eureka.vision.cards import CardReading
 from dr_eureka.vision.tubes import TubeScene, TubeSettings, locate_tubes
-from dr_eureka.vision.voting import CardVote, TubeVote, VoteSettings
+from dr_eureka.vision.voting import CardVote, RepeatedPictures, TubeVote, VoteSettings
 
 CONFIG = "config/dr_eureka_main.yaml"
 
@@ -73,7 +73,10 @@ def replay(camera: RecordedCamera, cards: ReadsCards, pieces: Pieces, settings: 
     card_vote, tube_vote = CardVote(settings.votes.card), TubeVote(settings.votes.tubes)
     card: Optional[CardReading] = None
     scene: Optional[TubeScene] = None
+    repeated = RepeatedPictures()
     for frame in camera.frames():
+        if repeated.add(frame.image):
+            continue
         if card is None:
             card = card_vote.add(cards.read(frame.image))
             if card is not None:

@@ -1,4 +1,4 @@
-"""The course of one or several games: look at the card, plan, find the tubes, have the plan carried out, check.
+"""The course of one or several games: look at the card, look at the tubes, plan, have the plan carried out, look again.
 
 A pure state machine. The node calls `step` with what it has seen; the flow commands the robot through `Robot` and
 tells everything it finds out to a `Listener`. It never waits: each wait is a phase with a limit and a name.
@@ -6,125 +6,88 @@ tells everything it finds out to a `Listener`. It never waits: each wait is a ph
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import reduce
-from typing import Any, Callable, Mapping, Optional, Protocol, Sequence
+from typing import Callable, Optional
 
+from dr_eureka.behaviour.card_confirmation import CardConfirmation, ConfirmAnswer, ConfirmCode
+from dr_eureka.behaviour.failure import Failure, failure_in
 from dr_eureka.behaviour.flow_settings import FlowSettings
-from dr_eureka.behaviour.guided_look import GuidedLook, HeadMotion, LookFailure
-from dr_eureka.behaviour.observation import NO_ANSWER, Answer, Gaze, Look, Observation, Robot
-from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Phase
-from dr_eureka.control.codes import EngineCode, EngineState
+from dr_eureka.behaviour.game_record import GameRecord
+from dr_eureka.behaviour.guided_look import GuidedLook
+from dr_eureka.behaviour.looks import BallLost, Looks, TubesFinding
+from dr_eureka.behaviour.observation import Gaze, Look, Observation, Robot
+from dr_eureka.behaviour.part_in_play import PartInPlay
+from dr_eureka.behaviour.plan_parts import next_part
+from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Listener, Phase
+from dr_eureka.control.codes import EngineState
 from dr_eureka.errors import DrEurekaError
-from dr_eureka.game.actions import Action, actions_for
-from dr_eureka.game.planner import plan_pours
-from dr_eureka.game.state import TUBES, Pour, State
-
-
-class Listener(Protocol):
-    """Who is told what the flow finds out."""
-
-    def on_card(self, finding: Any) -> None:
-        """A card was read (what the card look returned)."""
-
-    def on_plan(self, start: State, goal: State, pours: Sequence[Pour], actions: Sequence[Action]) -> None:
-        """A plan was made."""
-
-    def on_tubes(self, finding: Any) -> None:
-        """The tubes were located (what the tube or result look returned)."""
-
-    def on_report(self, report: GameReport) -> None:
-        """Phase, code or action changed."""
-
-
-@dataclass(frozen=True)
-class Looks:
-    """Makers of the looks: at the card, at the tubes' places, and at places and contents after the pours."""
-
-    card: Callable[[], Look]
-    tubes: Callable[[], Look]
-    result: Callable[[], Look]
+from dr_eureka.game.actions import actions_for
+from dr_eureka.game.state import Pour, State
 
 
 class GameFlow:
-    """Plays `games` games in a row, each from the state in which the last one ended.
+    """Plays `games` games in a row.
 
-    `goal` replaces the card of the first game. A plan is carried out in parts; what the tubes hold after each is looked at,
-    and if a pour went wrong, the rest is planned from what was seen. Without a `robot` (a replayed recording) nothing is commanded: every image is
-    looked at, for the card first and then for the tubes, and the game ends when both are found.
+    What the tubes hold is seen before each game, never believed. `goal` replaces the card of the first game. With
+    `confirm_card` a person must confirm or correct what was read from a card before the robot goes on. `plan` gives the
+    pours from a state to a goal; they are carried out in parts. What the tubes hold after each is looked at, and if a pour
+    went wrong, the rest is planned from what was seen. A ball that is in no tube ends the game. Without a `robot` (a
+    replayed recording) nothing is commanded and nothing asked: every image is looked at, for the card first and then for the
+    tubes, and the game ends when both are found.
     """
 
     def __init__(
         self,
         settings: FlowSettings,
-        start: State,
         goal: Optional[State],
         games: int,
+        plan: Callable[[State, State], tuple[Pour, ...]],
         pour: str,
         looks: Looks,
         listener: Listener,
         robot: Optional[Robot],
+        confirm_card: bool = False,
     ):
         self._settings = settings
+        self._plan = plan
         self._looks = looks
         self._listener = listener
         self._robot = robot
+        self._confirm_card = confirm_card and robot is not None
         self._games = games
         self._pour_method = pour
         self._phase = Phase.WAITING_FOR_ENGINE
         self._phase_began_s = 0.0
-        self._now: Optional[Observation] = None
-        self._game_began: Optional[Observation] = None
-        self._look: Optional[GuidedLook] = None
-        self._head: Optional[HeadMotion] = None
-        self._start_game(0, start, goal)
-
-    def _start_game(self, game: int, start: State, goal: Optional[State]) -> None:
-        self._game = game
-        self._start = self._present = start
-        self._goal = goal
-        self._code = GameCode.UNDECIDED
         self._message = ""
-        self._pours: tuple[Pour, ...] = ()
+        self._now: Optional[Observation] = None
+        self._look: Optional[GuidedLook] = None
+        self._confirmation: Optional[CardConfirmation] = None
+        self._game = GameRecord(0, goal=goal)
         self._pours_ahead: tuple[Pour, ...] = ()
-        self._actions: tuple[Action, ...] = ()
-        self._records: list[ActionRecord] = []
-        self._part_length = 0
-        self._earlier_records = 0
-        self._replans = 0
-        self._places: Mapping[str, Any] = {}
-        self._strategy_id: Optional[int] = None
-        self._game_began = self._now
+        self._playing: Optional[PartInPlay] = None
+        self._earlier: tuple[tuple[Pour, ...], tuple[ActionRecord, ...]] = (), ()
 
     @property
     def over(self) -> bool:
         """Tell whether all games are finished or one has failed."""
         return self._now is not None and self.report().last
 
+    @property
+    def looking(self) -> bool:
+        """Tell whether images are wanted now."""
+        if self._phase == Phase.PLAYING:
+            return self._playing is not None and self._playing.looking
+        return self._phase != Phase.WAITING_FOR_CONFIRMATION
+
     def report(self) -> GameReport:
         """Return the present game as it stands."""
-        began, now = self._game_began, self._now
-        return GameReport(
-            phase=self._phase,
-            code=self._code,
-            game=self._game,
-            games=self._games,
-            start=str(self._start),
-            goal=str(self._goal) if self._goal else "",
-            pours=self._pours,
-            actions=tuple(self._records),
-            replans=self._replans,
-            robot_seconds=now.robot_s - began.robot_s if began else 0.0,
-            wall_seconds=now.wall_s - began.wall_s if began else 0.0,
-            message=self._message,
-        )
+        return self._game.report(self._games, self._phase, self._message, self._now)
 
     def fail(self, code: str, message: str) -> None:
         """End the game, and any that should follow, with a named code and one line that says why; the robot stops."""
         engine = self._now.engine if self._now else None
         if self._robot and engine and engine.state == EngineState.BUSY:
             self._robot.stop()
-        self._code = code
+        self._game.code = code
         self._enter(Phase.FAILED, message)
 
     def step(self, now: Observation) -> None:
@@ -134,7 +97,7 @@ class GameFlow:
         first = self._now is None
         self._now = now
         if first:
-            self._game_began = now
+            self._game.began = now
             self._enter(Phase.WAITING_FOR_ENGINE if self._robot else Phase.WAITING_FOR_CAMERA)
         if self._robot and self._phase != Phase.WAITING_FOR_ENGINE and self._engine_is_silent():
             self.fail(GameCode.ENGINE_LOST, f"control_engine has sent no status for {self._settings.engine_silence:g} s")
@@ -143,6 +106,7 @@ class GameFlow:
             Phase.WAITING_FOR_ENGINE: self._wait_for_engine,
             Phase.WAITING_FOR_CAMERA: self._wait_for_camera,
             Phase.LOOKING_FOR_CARD: self._look_for_card,
+            Phase.WAITING_FOR_CONFIRMATION: self._wait_for_confirmation,
             Phase.LOOKING_FOR_TUBES: self._look_for_tubes,
             Phase.PLAYING: self._play,
             Phase.CHECKING: self._check,
@@ -170,10 +134,10 @@ class GameFlow:
 
     def _wait_for_camera(self) -> None:
         if self._now.camera_seen:
-            if self._goal is None:
+            if self._game.goal is None:
                 self._begin_card_look()
-            elif self._make_plan():
-                self._begin_tube_look()
+            else:
+                self._begin_tube_look(Phase.LOOKING_FOR_TUBES, self._settings.tubes_limit)
         elif self._waited_s() > self._settings.camera_limit:
             problem = self._now.camera_problem or "no image"
             self.fail(GameCode.NO_CAMERA, f"{problem} within {self._settings.camera_limit:g} s")
@@ -181,158 +145,141 @@ class GameFlow:
     def _begin_card_look(self) -> None:
         self._begin_look(Phase.LOOKING_FOR_CARD, self._settings.card_gaze, self._looks.card(), self._settings.card_limit)
 
-    def _begin_tube_look(self) -> None:
-        self._begin_look(Phase.LOOKING_FOR_TUBES, self._settings.sheet_gaze, self._looks.tubes(), self._settings.tubes_limit)
+    def _begin_tube_look(self, phase: str, limit_s: float) -> None:
+        self._begin_look(phase, self._settings.sheet_gaze, self._looks.tubes(), limit_s)
 
     def _begin_look(self, phase: str, gaze: Gaze, look: Look, limit_s: float) -> None:
         self._look = GuidedLook(look, gaze if self._robot else None, limit_s, self._settings, self._now)
         self._enter(phase)
-        if self._robot:
-            self._accepted(self._robot.look_at(gaze, self._settings.head_duration))
-
-    def _accepted(self, answer: Answer) -> bool:
-        if answer.code == NO_ANSWER:
-            self.fail(GameCode.ENGINE_LOST, answer.message)
-        elif answer.code != EngineCode.OK:
-            self.fail(GameCode.ENGINE_REFUSED, f"control_engine: {answer.code}: {answer.message}")
-        return answer.code == EngineCode.OK
-
-    def _found(self) -> Any:
-        """Return what the present look has found by now, None for nothing yet; fail the game when it failed."""
-        outcome = self._look.step(self._now)
-        if isinstance(outcome, LookFailure):
-            self.fail(outcome.code, outcome.message)
-            return None
-        return outcome
+        refused = failure_in(self._robot.look_at(gaze, self._settings.head_duration)) if self._robot else None
+        if refused:
+            self.fail(refused.code, refused.message)
 
     def _look_for_card(self) -> None:
-        finding = self._found()
+        finding = self._look.step(self._now)
         if finding is None:
             return
-        if self._game > 0 and finding.state == self._start:
+        if isinstance(finding, Failure):
+            self.fail(finding.code, finding.message)
+            return
+        if finding.state == self._game.start:
             # The card of the last game is still being shown: wait for the next one, within the same limit.
             self._look.begin_again(self._looks.card())
             return
-        self._goal = finding.state
+        self._game.card = finding.state
         self._listener.on_card(finding)
-        if self._make_plan():
-            self._begin_tube_look()
+        if self._confirm_card:
+            limit_s = self._settings.confirm_limit
+            self._confirmation = CardConfirmation(finding.state, limit_s, self._now)
+            message = f"the card was read as {finding.state}: confirm or correct it by ~confirm_card within {limit_s:g} s"
+            self._enter(Phase.WAITING_FOR_CONFIRMATION, message)
+        else:
+            self._play_for(finding.state)
 
-    def _make_plan(self) -> bool:
-        """Plan from what the tubes hold to the goal; return whether there is anything to do."""
+    def confirm_card(self, text: str) -> ConfirmAnswer:
+        """Take a person's word about the card: empty confirms it, a state such as RR|GG|PP corrects it."""
+        if self._phase != Phase.WAITING_FOR_CONFIRMATION:
+            return ConfirmAnswer(ConfirmCode.NOT_WAITING, f"no card waits for confirmation: the game is {self._phase}")
+        return self._confirmation.answer(text)
+
+    def _wait_for_confirmation(self) -> None:
+        outcome = self._confirmation.step(self._now)
+        if isinstance(outcome, Failure):
+            self.fail(outcome.code, outcome.message)
+        elif outcome is not None:
+            self._listener.on_confirmation(self._game.card, outcome)
+            self._play_for(outcome)
+
+    def _play_for(self, goal: State) -> None:
+        self._game.goal = goal
+        self._begin_tube_look(Phase.LOOKING_FOR_TUBES, self._settings.tubes_limit)
+
+    def _look_for_tubes(self) -> None:
+        finding = self._found_tubes()
+        if isinstance(finding, Failure):
+            self.fail(finding.code, finding.message)
+        elif finding:
+            self._game.start = finding.state
+            self._listener.on_tubes(finding)
+            self._plan_from(finding)
+
+    def _found_tubes(self) -> TubesFinding | Failure | None:
+        outcome = self._look.step(self._now)
+        return Failure(GameCode.BALL_LOST, outcome.message) if isinstance(outcome, BallLost) else outcome
+
+    def _plan_from(self, seen: TubesFinding) -> None:
+        """Plan from what the tubes hold to the goal, and begin to carry that out."""
+        goal = self._game.goal
         self._enter(Phase.PLANNING)
         try:
-            self._pours_ahead = plan_pours(self._present, self._goal)
+            self._pours_ahead = self._plan(seen.state, goal)
             actions = actions_for(self._pours_ahead)
         except DrEurekaError as error:
             self.fail(GameCode.NO_PLAN, str(error))
-            return False
-        self._listener.on_plan(self._present, self._goal, self._pours_ahead, actions)
-        if self._robot and not actions:
-            self._finish(GameCode.SOLVED, "the goal is the start: nothing to pour")
-            return False
-        return True
-
-    def _look_for_tubes(self) -> None:
-        finding = self._found()
-        if finding is None:
             return
-        self._listener.on_tubes(finding)
+        self._listener.on_plan(seen.state, goal, self._pours_ahead, actions)
         if self._robot is None:
             self._finish(GameCode.REPLAYED, "card, plan and tubes found in the recording")
+        elif not actions:
+            self._finish(GameCode.SOLVED, "the tubes hold the goal already: nothing to pour")
         else:
-            self._begin_playing(finding.tubes)
+            self._play_on(seen)
 
-    def _begin_playing(self, tubes: Mapping[str, Any]) -> None:
-        """Take the next part of the plan, and turn the head to where its pours will be seen before anything else moves."""
-        gaze = self._settings.watch_gaze
-        count = pours_until_look(self._pours_ahead, self._settings.pours_per_look)
-        part, self._pours_ahead = self._pours_ahead[:count], self._pours_ahead[count:]
-        self._actions = actions_for(part)
-        self._part_length = count
-        self._pours += part
-        self._places = tubes
-        self._strategy_id = None
-        self._earlier_records = len(self._records)
-        self._head = HeadMotion(gaze, self._settings, self._now)
+    def _play_on(self, seen: TubesFinding) -> None:
+        """Give the next part of the plan to the engine."""
+        part = next_part(seen.state, self._pours_ahead, self._settings.pours_per_look)
+        self._pours_ahead = self._pours_ahead[len(part.pours) :]
+        self._earlier = self._game.pours, self._game.actions
+        self._game.pours += part.pours
         self._enter(Phase.PLAYING)
-        self._accepted(self._robot.look_at(gaze, self._settings.head_duration))
-
-    def _begin_strategy(self) -> None:
-        arrived = self._head.step(self._now)
-        if isinstance(arrived, LookFailure):
-            self.fail(arrived.code, arrived.message)
-        if arrived is not True:
-            return
-        balls = {tube: len(content) for tube, content in zip(TUBES, self._present.tubes)}
-        answer = self._robot.execute(self._actions, self._places, balls, self._pour_method)
-        if self._accepted(answer):
-            self._strategy_id = answer.strategy_id
+        self._playing = PartInPlay(
+            part, seen.tubes, self._pour_method, self._robot, self._settings, self._now, self._game.since_began_s,
+            self._looks.read_held,
+        )
 
     def _play(self) -> None:
-        engine = self._now.engine
-        if self._strategy_id is None:
-            self._begin_strategy()
-            return
-        if engine.strategy_id != self._strategy_id:
-            return
-        self._record(engine.action_index)
-        if engine.state == EngineState.DONE:
-            gaze, limit_s = self._settings.sheet_gaze, self._settings.check_limit
-            self._begin_look(Phase.CHECKING, gaze, self._looks.result(), limit_s)
-        elif engine.state != EngineState.BUSY:
-            doing = f"action {engine.action_index}: " if engine.action_index >= 0 else ""
-            self.fail(GameCode.ENGINE_FAULT, f"control_engine: {engine.code}: {doing}{engine.message}")
-
-    def _record(self, action_index: int) -> None:
-        """Note when actions begin and end; the engine may have finished several since the last status."""
-        now_s = self._now.robot_s - self._game_began.robot_s
-        begun = len(self._records) - self._earlier_records
-        if begun:
-            last = self._records[-1]
-            self._records[-1] = ActionRecord(last.action, last.start_s, now_s)
-        news = self._actions[begun : action_index + 1]
-        self._records += [ActionRecord(action, now_s, now_s) for action in news]
-        if news:
+        outcome = self._playing.step(self._now)
+        begun = len(self._game.actions)
+        earlier_pours, earlier_actions = self._earlier
+        self._game.pours = earlier_pours + self._playing.part.pours
+        self._game.actions = earlier_actions + self._playing.records
+        if len(self._game.actions) > begun:
             self._listener.on_report(self.report())
+        if isinstance(outcome, Failure):
+            self.fail(outcome.code, outcome.message)
+        elif outcome:
+            self._pours_ahead = self._playing.left_out + self._pours_ahead
+            self._begin_tube_look(Phase.CHECKING, self._settings.check_limit)
 
     def _check(self) -> None:
-        outcome = self._look.step(self._now)
-        if outcome is None:
-            return
-        if isinstance(outcome, LookFailure):
-            if outcome.seen:
-                self._finish(GameCode.UNCHECKED, outcome.message)
+        found = self._found_tubes()
+        if isinstance(found, Failure):
+            if found.seen and not self._pours_ahead:
+                self._finish(GameCode.UNCHECKED, found.message)
             else:
-                self.fail(outcome.code, outcome.message)
-            return
-        expected = reduce(State.after, self._pours[-self._part_length :], self._present)
-        self._present = outcome.state
-        if self._present == self._goal:
+                self.fail(found.code, found.message)
+        elif found:
+            self._listener.on_tubes(found)
+            self._judge(found)
+
+    def _judge(self, seen: TubesFinding) -> None:
+        """Compare what the tubes hold with what the pours should have led to, and go on from what is there."""
+        goal, replans, expected = self._game.goal, self._game.replans, self._playing.part.expected
+        if seen.state == goal:
             self._finish(GameCode.SOLVED, "")
-        elif self._present == expected:
-            self._listener.on_tubes(outcome)
-            self._begin_playing(outcome.tubes)
-        elif self._replans == self._settings.most_replans:
-            seen = f"the tubes hold {self._present} instead of {self._goal}"
-            self.fail(GameCode.NOT_SOLVED, f"{seen} after {self._replans} replans")
+        elif seen.state == expected:
+            self._play_on(seen)
+        elif replans == self._settings.most_replans:
+            self.fail(GameCode.NOT_SOLVED, f"the tubes hold {seen.state} instead of {goal} after {replans} replans")
         else:
-            self._replans += 1
-            self._listener.on_tubes(outcome)
-            if self._make_plan():
-                self._begin_playing(outcome.tubes)
+            self._game.replans += 1
+            self._listener.on_surprise(expected, seen.state)
+            self._plan_from(seen)
 
     def _finish(self, code: str, message: str) -> None:
-        self._code = code
+        self._game.code = code
         self._enter(Phase.FINISHED, message)
-        if self._game + 1 < self._games:
-            self._start_game(self._game + 1, self._goal, None)
+        if self._game.number + 1 < self._games:
+            self._game = GameRecord(self._game.number + 1, start=self._game.goal, began=self._now)
+            self._message = ""
             self._begin_card_look()
-
-
-def pours_until_look(pours: Sequence[Pour], least: int) -> int:
-    """Return how many pours to carry out before the next look: `least`, and those that follow with the same two tubes."""
-    count = min(least, len(pours))
-    while count < len(pours) and {pours[count].source, pours[count].target} == {pours[count - 1].source, pours[count - 1].target}:
-        count += 1
-    return count

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Optional
 
+from dr_eureka.behaviour.failure import Failure
 from dr_eureka.behaviour.flow_settings import FlowSettings
 from dr_eureka.behaviour.observation import Frame, Gaze, Look, Observation
 from dr_eureka.behaviour.report import GameCode
 from dr_eureka.control.codes import EngineState
-
-
-@dataclass(frozen=True)
-class LookFailure:
-    """Why a look ended without a finding; `seen` tells that there were images, but they did not decide."""
-
-    code: str
-    message: str
-    seen: bool
 
 
 class HeadMotion:
@@ -28,8 +19,8 @@ class HeadMotion:
         self._settings = settings
         self._began_s = now.wall_s
 
-    def step(self, now: Observation) -> bool | LookFailure:
-        """Return whether the head has arrived, or a LookFailure when the limit is over."""
+    def step(self, now: Observation) -> bool | Failure:
+        """Return whether the head has arrived, or a Failure when the limit is over."""
         head, engine, limit_s = now.head, now.engine, self._settings.head_limit
         off = max(abs(head.head_y - self._gaze.head_y), abs(head.head_p - self._gaze.head_p)) if head else float("inf")
         if off <= self._settings.head_tolerance and engine.state != EngineState.BUSY:
@@ -38,7 +29,7 @@ class HeadMotion:
             return False
         state = f"control_engine {engine.state} {engine.code} {engine.message}"
         message = f"head at {head} after {limit_s:g} s, expected {self._gaze} ({state})"
-        return LookFailure(GameCode.HEAD_NOT_STILL, message, seen=False)
+        return Failure(GameCode.HEAD_NOT_STILL, message)
 
 
 class GuidedLook:
@@ -49,14 +40,15 @@ class GuidedLook:
         self._head = HeadMotion(gaze, settings, now) if gaze else None
         self._limit_s = limit_s
         self._camera_limit_s = settings.camera_limit
+        self._frozen_limit_s = settings.frozen_limit
         self._looking_since: Optional[Observation] = None if gaze else now
         self._frame_seen_s = now.wall_s
 
     def step(self, now: Observation) -> Any:
-        """Return what the look found, a LookFailure when a limit is over, else None."""
+        """Return what the look found, a Failure when a limit is over, else None."""
         if self._looking_since is None:
             arrived = self._head.step(now)
-            if isinstance(arrived, LookFailure):
+            if isinstance(arrived, Failure):
                 return arrived
             if arrived:
                 self._looking_since, self._frame_seen_s = now, now.wall_s
@@ -66,11 +58,14 @@ class GuidedLook:
             finding = self._look.add(now.frame)
             if finding is not None:
                 return finding
+        if now.camera_frozen and now.wall_s - self._frame_seen_s > self._frozen_limit_s:
+            message = f"nothing new from the camera for {self._frozen_limit_s:g} s: {now.camera_problem}"
+            return Failure(GameCode.CAMERA_FROZEN, message)
         if now.wall_s - self._frame_seen_s > self._camera_limit_s:
             return self._miss_the_camera(now)
         if now.wall_s - self._looking_since.wall_s > self._limit_s:
             code, reason = self._look.failure()
-            return LookFailure(code, f"{reason} within {self._limit_s:g} s", seen=True)
+            return Failure(code, f"{reason} within {self._limit_s:g} s", seen=True)
         return None
 
     def begin_again(self, look: Look) -> None:
@@ -80,10 +75,10 @@ class GuidedLook:
     def _usable(self, frame: Optional[Frame]) -> bool:
         return frame is not None and (self._head is None or frame.stamp_s >= self._looking_since.robot_s)
 
-    def _miss_the_camera(self, now: Observation) -> LookFailure:
+    def _miss_the_camera(self, now: Observation) -> Failure:
         limit_s = self._camera_limit_s
         if self._head is None:
             # A recording has simply come to its end: what matters is what was not found in it.
             code, reason = self._look.failure()
-            return LookFailure(code, f"{reason}, and the recording gave no image for {limit_s:g} s", seen=True)
-        return LookFailure(GameCode.NO_CAMERA, f"{now.camera_problem or 'no image'} within {limit_s:g} s", seen=False)
+            return Failure(code, f"{reason}, and the recording gave no image for {limit_s:g} s", seen=True)
+        return Failure(GameCode.NO_CAMERA, f"{now.camera_problem or 'no image'} within {limit_s:g} s")

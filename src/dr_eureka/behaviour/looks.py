@@ -1,4 +1,4 @@
-"""Looking at something until enough images agree: which card is shown, and where the tubes stand."""
+"""Looking at something until enough images agree: which card is shown, where the tubes stand and what they hold."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Callable, Generic, Optional, Protocol, TypeVar
 
 import numpy as np
 
-from dr_eureka.behaviour.observation import Frame
+from dr_eureka.behaviour.held_look import ReadHeld
+from dr_eureka.behaviour.observation import Frame, ImageHeader, Look
 from dr_eureka.behaviour.report import GameCode
 from dr_eureka.game.state import State
 from dr_eureka.vision.cards import CardReading, CardResult
 from dr_eureka.vision.contents import ContentsReading
 from dr_eureka.vision.tubes import TubePlace, TubeResult, TubeScene
+from dr_eureka.vision.voting import LossVote
 
 Reading = TypeVar("Reading")
 
@@ -29,21 +31,22 @@ class Vote(Protocol, Generic[Reading]):
 
 @dataclass(frozen=True, eq=False)
 class CardFinding:
-    """The card that won the vote, as the robot saw it last at `stamp_s`, after `images` images."""
+    """The card that won the vote after `images` images: its surest reading, and the header of the image that was read."""
 
     state: State
     reading: CardReading
-    stamp_s: float
+    header: ImageHeader
     images: int
 
 
 @dataclass(frozen=True, eq=False)
 class TubesFinding:
-    """The tubes as the vote places them, seen last at `stamp_s`, after `images` images."""
+    """The tubes as the votes have them after `images` images, of which the last has this header: places and contents."""
 
     scene: TubeScene
-    stamp_s: float
+    header: ImageHeader
     images: int
+    state: State
 
     @property
     def tubes(self) -> dict[str, TubePlace]:
@@ -51,56 +54,55 @@ class TubesFinding:
         return self.scene.tubes
 
 
-@dataclass(frozen=True, eq=False)
-class ResultFinding(TubesFinding):
-    """Where the tubes stand and what they hold."""
+@dataclass(frozen=True)
+class BallLost:
+    """At least one ball is in no tube; `message` is one line that tells which and how it is known."""
 
-    state: State
+    message: str
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Makers of the looks at the card and at the tubes, and how tubes in the hands are read."""
+
+    card: Callable[[], Look]
+    tubes: Callable[[], Look]
+    read_held: ReadHeld
 
 
 class CardLook:
-    """Reads the card in one image after the other until the vote is won."""
+    """Reads the card in one image after the other until the vote is won; tells each reading to `tell`."""
 
-    def __init__(self, read: Callable[[np.ndarray], CardReading], vote: Vote):
+    def __init__(
+        self, read: Callable[[np.ndarray], CardReading], vote: Vote, tell: Callable[[Frame, CardReading], None]
+    ):
         self._read = read
         self._vote = vote
-        self._images = 0
+        self._tell = tell
+        self._readings: list[tuple[CardReading, ImageHeader]] = []
 
     def add(self, frame: Frame) -> Optional[CardFinding]:
         """Read the card in one more image; return the decision once there is one."""
-        self._images += 1
-        winner = self._vote.add(self._read(frame.image))
-        return CardFinding(State.parse(winner.state), winner, frame.stamp_s, self._images) if winner else None
+        reading = self._read(frame.image)
+        self._readings.append((reading, frame.header))
+        self._tell(frame, reading)
+        winner = self._vote.add(reading)
+        if winner is None:
+            return None
+        header = next(header for reading, header in self._readings if reading is winner)
+        return CardFinding(State.parse(winner.state), winner, header, len(self._readings))
 
     def failure(self) -> tuple[str, str]:
         """Return NO_CARD or CARD_UNREADABLE, and what was seen instead of a readable card."""
         result, reason = self._vote.undecided()
-        code = GameCode.NO_CARD if self._images == 0 or result == CardResult.NO_CARD else GameCode.CARD_UNREADABLE
-        return code, f"no card decided in {self._images} images ({reason})"
+        code = GameCode.NO_CARD if not self._readings or result == CardResult.NO_CARD else GameCode.CARD_UNREADABLE
+        return code, f"no card decided in {len(self._readings)} images ({reason})"
 
 
 class TubeLook:
-    """Locates the tubes in one image after the other until the vote is won."""
-
-    def __init__(self, locate: Callable[[Frame], TubeScene], vote: Vote):
-        self._locate = locate
-        self._vote = vote
-        self._images = 0
-
-    def add(self, frame: Frame) -> Optional[TubesFinding]:
-        """Locate the tubes in one more image; return the decision once there is one."""
-        self._images += 1
-        winner = self._vote.add(self._locate(frame))
-        return TubesFinding(winner, frame.stamp_s, self._images) if winner else None
-
-    def failure(self) -> tuple[str, str]:
-        """Return NO_TUBES, and what was seen instead."""
-        result, reason = self._vote.undecided()
-        return GameCode.NO_TUBES, f"tubes not located in {self._images} images ({result}: {reason})"
-
-
-class ResultLook:
-    """Looks where the tubes stand and what they hold, in one image after the other until both votes are won."""
+    """Looks where the tubes stand and what they hold, in one image after the other until both votes are won, or until
+    enough images agree that a ball is in no tube.
+    """
 
     def __init__(
         self,
@@ -108,14 +110,17 @@ class ResultLook:
         read: Callable[[Frame, TubeScene], ContentsReading],
         place_vote: Vote,
         contents_vote: Vote,
+        loss_vote: LossVote,
     ):
         self._locate = locate
         self._read = read
         self._place_vote = place_vote
         self._contents_vote = contents_vote
+        self._loss_vote = loss_vote
         self._images = 0
+        self._located = False
 
-    def add(self, frame: Frame) -> Optional[ResultFinding]:
+    def add(self, frame: Frame) -> TubesFinding | BallLost | None:
         """Look at one more image; return the decision once there is one."""
         self._images += 1
         scene = self._locate(frame)
@@ -124,11 +129,18 @@ class ResultLook:
         else:
             reading = ContentsReading(scene.result, None, 0.0, scene.reason)
         placed, held = self._place_vote.add(scene), self._contents_vote.add(reading)
+        lost = self._loss_vote.add(reading)
+        self._located = self._located or placed is not None
+        if lost:
+            return BallLost(lost)
         if placed is None or held is None:
             return None
-        return ResultFinding(placed, frame.stamp_s, self._images, State.parse(held.state))
+        return TubesFinding(placed, frame.header, self._images, State.parse(held.state))
 
     def failure(self) -> tuple[str, str]:
-        """Return UNCHECKED, and what was seen instead."""
+        """Return NO_TUBES or NO_CONTENTS, and what was seen instead."""
+        if not self._located:
+            result, reason = self._place_vote.undecided()
+            return GameCode.NO_TUBES, f"tubes not located in {self._images} images ({result}: {reason})"
         result, reason = self._contents_vote.undecided()
-        return GameCode.UNCHECKED, f"contents of the tubes not read in {self._images} images ({result}: {reason})"
+        return GameCode.NO_CONTENTS, f"contents of the tubes not read in {self._images} images ({result}: {reason})"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Mapping, Optional, Protocol, Sequence
 
 import numpy as np
@@ -21,23 +21,38 @@ class Gaze:
     head_p: float
 
 
+@dataclass(frozen=True)
+class ImageHeader:
+    """Which image it is: its robot time in whole nanoseconds, so that it compares equal, and the camera's frame."""
+
+    stamp_ns: int
+    frame_id: str
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """An image taken with the head at rest.
 
-    `image` is (height, width, 3) uint8 rgb, `camera` a `vision.camera.CameraModel`, `base_from_camera` (4, 4),
-    `stamp_s` the robot time of the image.
+    `image` is (height, width, 3) uint8 rgb, `camera` a `vision.camera.CameraModel`, `base_from_camera` (4, 4).
     """
 
-    stamp_s: float
+    header: ImageHeader
     image: np.ndarray
     camera: Any
     base_from_camera: np.ndarray
 
+    @property
+    def stamp_s(self) -> float:
+        """Robot time of the image [s]."""
+        return self.header.stamp_ns * 1e-9
+
 
 @dataclass(frozen=True)
 class EngineView:
-    """The control engine's last status, and the wall time at which it was heard."""
+    """The control engine's last status, and the wall time at which it was heard.
+
+    `held` has base_from_tube (4, 4) of each tube in a hand while the engine pauses for a look after a pour, else nothing.
+    """
 
     state: str
     code: str
@@ -45,14 +60,16 @@ class EngineView:
     action_index: int
     message: str
     heard_wall_s: float
+    held: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Observation:
     """Everything the flow knows at one step.
 
-    `frame` is a new image or None; `camera_seen` tells that images arrive at all, `camera_problem` why none is usable;
-    `head` holds the present `head_y` and `head_p` [rad], or is None before the first joint state.
+    `frame` is a new image or None; `camera_seen` tells that images arrive at all, `camera_problem` why none is usable,
+    `camera_frozen` that what arrives repeats the image before; `head` holds the present `head_y` and `head_p` [rad], or is
+    None before the first joint state.
     """
 
     wall_s: float
@@ -61,6 +78,7 @@ class Observation:
     frame: Optional[Frame] = None
     camera_seen: bool = False
     camera_problem: str = ""
+    camera_frozen: bool = False
     head: Optional[Gaze] = None
 
 
@@ -80,7 +98,13 @@ class Robot(Protocol):
         """Begin to turn the head."""
 
     def execute(self, actions: Sequence[Action], tubes: Mapping[str, Any], balls: Mapping[str, int], pour: str) -> Answer:
-        """Begin a strategy; `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds."""
+        """Begin a strategy that pauses after each pour but the last.
+
+        `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds.
+        """
+
+    def go_on(self, put_down: bool) -> Answer:
+        """End the engine's pause after a pour: carry the strategy on, or put down what is held and leave the rest."""
 
     def stop(self) -> Answer:
         """Stop whatever moves, and hold."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Protocol, Sequence
 
 from dr_eureka.game.actions import Action
-from dr_eureka.game.state import Pour
+from dr_eureka.game.state import Pour, State
 
 
 class Phase:
@@ -14,16 +15,17 @@ class Phase:
     WAITING_FOR_ENGINE = "WAITING_FOR_ENGINE"
     WAITING_FOR_CAMERA = "WAITING_FOR_CAMERA"
     LOOKING_FOR_CARD = "LOOKING_FOR_CARD"
-    PLANNING = "PLANNING"
+    WAITING_FOR_CONFIRMATION = "WAITING_FOR_CONFIRMATION"
     LOOKING_FOR_TUBES = "LOOKING_FOR_TUBES"
+    PLANNING = "PLANNING"
     PLAYING = "PLAYING"
     CHECKING = "CHECKING"
     FINISHED = "FINISHED"
     FAILED = "FAILED"
 
     ALL = (
-        WAITING_FOR_ENGINE, WAITING_FOR_CAMERA, LOOKING_FOR_CARD, PLANNING, LOOKING_FOR_TUBES, PLAYING, CHECKING,
-        FINISHED, FAILED,
+        WAITING_FOR_ENGINE, WAITING_FOR_CAMERA, LOOKING_FOR_CARD, WAITING_FOR_CONFIRMATION, LOOKING_FOR_TUBES, PLANNING,
+        PLAYING, CHECKING, FINISHED, FAILED,
     )
 
 
@@ -41,15 +43,20 @@ class GameCode:
     ENGINE_FAULT = "ENGINE_FAULT"
     HEAD_NOT_STILL = "HEAD_NOT_STILL"
     NO_CAMERA = "NO_CAMERA"
+    CAMERA_FROZEN = "CAMERA_FROZEN"
     NO_CARD = "NO_CARD"
     CARD_UNREADABLE = "CARD_UNREADABLE"
+    NOT_CONFIRMED = "NOT_CONFIRMED"
     NO_TUBES = "NO_TUBES"
+    NO_CONTENTS = "NO_CONTENTS"
+    BALL_LOST = "BALL_LOST"
     NO_PLAN = "NO_PLAN"
     INTERNAL_ERROR = "INTERNAL_ERROR"
 
     ALL = (
         UNDECIDED, SOLVED, UNCHECKED, NOT_SOLVED, REPLAYED, NO_ENGINE, ENGINE_LOST, ENGINE_REFUSED, ENGINE_FAULT,
-        HEAD_NOT_STILL, NO_CAMERA, NO_CARD, CARD_UNREADABLE, NO_TUBES, NO_PLAN, INTERNAL_ERROR,
+        HEAD_NOT_STILL, NO_CAMERA, CAMERA_FROZEN, NO_CARD, CARD_UNREADABLE, NOT_CONFIRMED, NO_TUBES, NO_CONTENTS, BALL_LOST,
+        NO_PLAN, INTERNAL_ERROR,
     )
 
 
@@ -64,13 +71,19 @@ class ActionRecord:
 
 @dataclass(frozen=True)
 class GameReport:
-    """One game as it stands; times are seconds since this game began."""
+    """One game as it stands; times are seconds since this game began.
+
+    `start` is what the tubes held at the beginning, empty until that was seen, or, after the first game, what the game
+    before left. `card` is the state read from the card, empty when none was read; `goal` differs from it when a person
+    corrected it.
+    """
 
     phase: str
     code: str
     game: int
     games: int
     start: str
+    card: str
     goal: str
     pours: tuple[Pour, ...]
     actions: tuple[ActionRecord, ...]
@@ -83,3 +96,25 @@ class GameReport:
     def last(self) -> bool:
         """Tell whether nothing follows this report: the last game is finished, or any game failed."""
         return self.phase == Phase.FAILED or (self.phase == Phase.FINISHED and self.game + 1 == self.games)
+
+
+class Listener(Protocol):
+    """Who is told what the flow finds out."""
+
+    def on_card(self, finding: Any) -> None:
+        """A card was read (what the card look returned)."""
+
+    def on_confirmation(self, card: State, goal: State) -> None:
+        """A person confirmed the card that was read, or corrected it to another goal."""
+
+    def on_plan(self, start: State, goal: State, pours: Sequence[Pour], actions: Sequence[Action]) -> None:
+        """A plan was made."""
+
+    def on_tubes(self, finding: Any) -> None:
+        """Where the tubes stand and what they hold was seen (what the tube look returned)."""
+
+    def on_surprise(self, expected: State, seen: State) -> None:
+        """The tubes hold something else than the pours should have led to; a new plan follows."""
+
+    def on_report(self, report: GameReport) -> None:
+        """Phase, code or action changed."""

@@ -39,7 +39,8 @@ class Scorecard:
         self._games.append(
             {
                 "seed": self._seed,
-                "start": report.start,
+                "start": report.start or None,
+                "card": report.card or None,
                 "goal": report.goal or None,
                 "verdict": report.code,
                 "message": report.message,

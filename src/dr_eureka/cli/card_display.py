@@ -8,7 +8,7 @@ from typing import Protocol
 
 from dr_eureka.cli.card_round import CardRound
 from dr_eureka.cli.keys import QUIT, RESTART, TUBE_KEYS, UNDO
-from dr_eureka.game.drawing import draw_state
+from dr_eureka.game.state import draw_state
 
 #: 256-colour codes of letter and ground; the letters stay for those who cannot tell the colours apart.
 _COLOURS = {"R": (231, 160), "G": (16, 40), "P": (231, 91)}

@@ -8,51 +8,46 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Optional
 
-import cv2
 import numpy as np
 
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.vision.cards import CardReader, CardReading, CardResult
+from dr_eureka.vision.pictures import PictureError, decode_picture
 
-
-class PictureError(DrEurekaError):
-    """A file that cannot be opened as a picture."""
+#: Result of a file that is missing or no whole picture; the others are those of `CardResult`.
+UNREADABLE_FILE = "UNREADABLE_FILE"
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command with its arguments (default: the process's) and return its exit code.
 
-    0 when every picture could be opened, whatever it shows; 1 otherwise; 2 for bad arguments.
+    0 when every picture could be opened, whatever it shows; 2 otherwise, and for bad arguments.
     """
     arguments = _parser().parse_args(argv)
     try:
         reader = CardReader.load()
     except DrEurekaError as error:
         print(f"recognise_card: {error}", file=sys.stderr)
-        return 1
-    failed = False
+        return 2
+    unopened = 0
     for name in arguments.images:
         try:
             reading = reader.read(read_picture(Path(name)))
-        except DrEurekaError as error:
-            print(f"recognise_card: {error}", file=sys.stderr)
-            failed = True
-            continue
+        except PictureError as error:
+            reading = CardReading(UNREADABLE_FILE, reason=str(error))
+            unopened += 1
         print(json.dumps(reading_as_mapping(name, reading)) if arguments.json else _line(name, reading), flush=True)
-    return 1 if failed else 0
+    if unopened:
+        print(f"recognise_card: {unopened} of {len(arguments.images)} pictures could not be opened", file=sys.stderr)
+    return 2 if unopened else 0
 
 
 def read_picture(path: Path) -> np.ndarray:
-    """Return a picture file as RGB (h, w, 3) uint8. Raises PictureError naming the file."""
+    """Return a picture file as RGB (h, w, 3) uint8. Raises PictureError."""
     try:
-        data = np.frombuffer(path.read_bytes(), np.uint8)
+        return decode_picture(path.read_bytes())
     except OSError as error:
-        raise PictureError(f"{path}: {error.strerror}; expected a picture") from error
-    # cv2 answers an empty buffer with an exception and a broken one with None.
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-    if image is None:
-        raise PictureError(f"{path}: not a picture that can be decoded; expected PNG, JPEG or the like")
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        raise PictureError(f"{error.strerror}; expected a picture") from error
 
 
 def reading_as_mapping(name: str, reading: CardReading) -> dict[str, Any]:
@@ -76,7 +71,8 @@ def _parser() -> argparse.ArgumentParser:
         prog="recognise_card",
         description="Read the Dr. Eureka card in each picture and print it as a state like RR|GG|PP.",
         epilog="Tubes left to right, balls bottom to top, R red, G green, P purple. A picture without one readable card "
-        "gets NO_CARD, SEVERAL_CARDS or UNREADABLE and the reason.",
+        "gets NO_CARD, SEVERAL_CARDS or UNREADABLE and the reason; a file that cannot be opened gets UNREADABLE_FILE, and "
+        "the exit code is then 2.",
     )
     parser.add_argument("images", metavar="IMAGE", nargs="+", help="PNG, JPEG or other picture file")
     parser.add_argument("--json", action="store_true", help="print one JSON object a picture instead of text")

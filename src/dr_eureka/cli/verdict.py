@@ -77,7 +77,7 @@ def read_games(file: Path) -> list[dict[str, Any]]:
 def describe(game: dict[str, Any]) -> str:
     """Return one line about a game: how it ended, from where to where, and what it cost."""
     verdict = {True: "SOLVED", False: "NOT SOLVED"}.get(game.get("solved"), "NOT JUDGED (no referee)")
-    facts = [f"{game.get('start')} to {game.get('goal') or 'an unknown goal'}"]
+    facts = [f"{game.get('start') or 'an unknown state'} to {game.get('goal') or 'an unknown goal'}"]
     if game.get("solved") is not True:
         facts.append(f"robot says {game.get('verdict')}" + (f" ({game['message']})" if game.get("message") else ""))
     facts.append(f"pours {game.get('pours')}")

@@ -59,6 +59,10 @@ class Body:
             raise ControlError(EngineCode.INVALID_ACTION, f"tube {tube!r} is not known to stand on the sheet; standing: {sorted(self.places)}")
         return self.places[tube]
 
+    def held_poses(self) -> dict[str, np.ndarray]:
+        """Return base_from_tube (4, 4) of each tube in a hand, by name, as the measured joints have it."""
+        return {held.tube: self.arms[hand].pose(self.joints) @ held.end_from_tube for hand, held in self.held.items()}
+
     def held_in(self, hand: str, tube: str) -> Held:
         """Return the tube held in a hand; raise ControlError if that hand holds another or none."""
         held = self.held.get(hand)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from types import MappingProxyType
 from typing import Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.body import Body
 from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode, EngineState
 from dr_eureka.control.limits import CommandLimiter, JointLimit
-from dr_eureka.control.motion import Follow, Motion
+from dr_eureka.control.motion import Follow, Motion, Wait
 from dr_eureka.control.picking import go_home, pick, place
 from dr_eureka.control.port import CONTROLLED_JOINTS, grip_joint
 from dr_eureka.control.pouring import pour, raise_tubes
@@ -30,12 +30,16 @@ GRIP_RANGE = (0.0, 1.15)
 
 @dataclass(frozen=True)
 class EngineStatus:
-    """What the engine is doing, or why it stopped; `action_index` counts the strategy's actions from 0, -1 outside one."""
+    """What the engine is doing, or why it stopped; `action_index` counts the strategy's actions from 0, -1 outside one.
+
+    `paused`: it holds both tubes after a pour, for somebody to look at them, until `go_on`.
+    """
 
     state: str
     code: str
     action_index: int
     message: str
+    paused: bool = False
 
 
 class ControlEngine:
@@ -65,6 +69,7 @@ class ControlEngine:
         self._last_tick: float | None = None
         self._lagging_since: dict[str, float] = {}
         self._action_index = -1
+        self._put_down = False
         self.status = EngineStatus(EngineState.IDLE, EngineCode.OK, -1, "ready")
         self.durations: list[tuple[int, float, float]] = []
         """(action index, start, end) [s] of every finished action of the strategy."""
@@ -76,11 +81,17 @@ class ControlEngine:
         return ranges
 
     def start(
-        self, actions: Sequence[Action], places: Mapping[str, Sequence[float]], balls: Mapping[str, int], method: str = "lock"
+        self,
+        actions: Sequence[Action],
+        places: Mapping[str, Sequence[float]],
+        balls: Mapping[str, int],
+        method: str = "lock",
+        pause_after_pours: bool = False,
     ) -> None:
         """Begin a strategy. Raises ControlError (BUSY, INVALID_VALUE, INVALID_ACTION).
 
         Tubes stand with their feet at `places` (3,) [m] in base and hold that many `balls` each; `method` is one of POUR_METHODS.
+        With `pause_after_pours` it waits for `go_on` after each pour but the last.
         """
         self._refuse_when_busy()
         if method not in POUR_METHODS:
@@ -95,7 +106,7 @@ class ControlEngine:
             raise ControlError(EngineCode.OUT_OF_LIMITS, f"torso_y is at {torso:.3f} rad, expected at most {self.settings.guards.torso} from 0")
         self.body.places = {tube: np.array(foot, dtype=float) for tube, foot in places.items()}
         self.durations = []
-        self._begin(self._strategy(tuple(actions), dict(balls), method), "strategy accepted")
+        self._begin(self._strategy(tuple(actions), dict(balls), method, pause_after_pours), "strategy accepted")
 
     @staticmethod
     def _check_actions(actions: Sequence[Action], places: Mapping[str, Sequence[float]]) -> None:
@@ -142,6 +153,13 @@ class ControlEngine:
         if not self.body.goals:
             raise ControlError(EngineCode.JOINT_STATES_LOST, "no joint state has been received yet")
         self._begin(self._joint_move(dict(goals), duration), f"moving {', '.join(goals)}")
+
+    def go_on(self, put_down: bool) -> None:
+        """End a pause: carry the strategy on, or leave it and put down what is held. Raises ControlError (INVALID_ACTION)."""
+        if not self.status.paused:
+            raise ControlError(EngineCode.INVALID_ACTION, f"no pour waits to be looked at: {self.status.message}")
+        self.status = replace(self.status, paused=False)
+        self._put_down = put_down
 
     def stop(self) -> None:
         """Stop in this cycle and hold; what is held stays held."""
@@ -202,9 +220,10 @@ class ControlEngine:
             self._script = None
             self.status = EngineStatus(EngineState.DONE, EngineCode.OK, self._action_index, "done")
 
-    def _strategy(self, actions: tuple[Action, ...], balls: dict[str, int], method: str) -> Iterator[Motion]:
+    def _strategy(self, actions: tuple[Action, ...], balls: dict[str, int], method: str, pauses: bool) -> Iterator[Motion]:
         body = self.body
         homes = dict(body.places)
+        self._put_down = False
         yield from go_home(body)
         for index, action in enumerate(actions):
             self._action_index, started = index, self._now
@@ -228,6 +247,15 @@ class ControlEngine:
             else:
                 raise ControlError(EngineCode.INVALID_ACTION, f"action {index} is {action.kind!r}, expected pick, place or pour")
             self.durations.append((index, started, self._now))
+            if pauses and action.kind == "pour" and any(later.kind == "pour" for later in actions[index + 1 :]):
+                self.status = replace(self.status, paused=True)
+                yield Wait(lambda *_: not self.status.paused, self.settings.guards.pause_seconds)
+                self.status = replace(self.status, paused=False)
+            if self._put_down:
+                yield from raise_tubes(body)
+                for hand, held in tuple(body.held.items()):
+                    yield from place(body, hand, held.tube, homes[held.tube])
+                break
         yield from go_home(body)
 
     def _joint_move(self, goals: dict[str, float], duration: float) -> Iterator[Motion]:

@@ -99,11 +99,13 @@ class DirectPourSettings:
 
 @dataclass(frozen=True)
 class GuardSettings:
-    """When the engine gives up: largest tracking error [rad] and for how long [s] it may last; torso's largest turn [rad]."""
+    """When the engine gives up: largest tracking error [rad] and for how long [s] it may last; torso's largest turn [rad];
+    longest pause after a pour [s]."""
 
     tracking_error: float = field(metadata=_POSITIVE)
     tracking_seconds: float = field(metadata=_POSITIVE)
     torso: float = field(metadata=_POSITIVE)
+    pause_seconds: float = field(metadata=_POSITIVE)
 
 
 @dataclass(frozen=True)

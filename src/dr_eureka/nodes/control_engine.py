@@ -12,11 +12,14 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 
 from dr_eureka import msg, srv
+from dr_eureka.control.arm_calibration import calibration_file, load_calibration
 from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode
 from dr_eureka.control.engine import ControlEngine, EngineStatus
 from dr_eureka.control.settings import ControlSettings
+from dr_eureka.game.hands import HANDS
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.nodes import messages
+from dr_eureka.nodes.folders import resolve
 from dr_eureka.nodes.parameters import private_parameters, take
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.pieces import load_pieces
@@ -33,6 +36,7 @@ class EngineNodeSettings:
     joint_states_timeout: float = field(metadata={"min": 0.02, "max": 60.0})
     status_period: float = field(metadata={"min": 0.01, "max": 1.0})
     default_pour: str = field(metadata={"choices": POUR_METHODS})
+    arm_calibration: str
 
 
 class ControlEngineNode:
@@ -45,8 +49,8 @@ class ControlEngineNode:
     ROS Subscribers:
         * **robotis/present_joint_states** (sensor_msgs/JointState): 125 Hz; every one is answered
     ROS Services:
-        * **~execute_strategy** (dr_eureka/ExecuteStrategy), **~get_joint** (dr_eureka/GetJoint),
-          **~set_joints** (dr_eureka/SetJoints), **~stop** (std_srvs/Trigger)
+        * **~execute_strategy** (dr_eureka/ExecuteStrategy), **~go_on** (dr_eureka/GoOn),
+          **~get_joint** (dr_eureka/GetJoint), **~set_joints** (dr_eureka/SetJoints), **~stop** (std_srvs/Trigger)
     """
 
     def __init__(self, engine: ControlEngine, settings: EngineNodeSettings):
@@ -65,6 +69,7 @@ class ControlEngineNode:
         self._module = rospy.Publisher("robotis/enable_ctrl_module", String, queue_size=1, latch=True)
         self._module.publish("none")
         rospy.Service("~execute_strategy", srv.ExecuteStrategy, self._execute_strategy)
+        rospy.Service("~go_on", srv.GoOn, self._go_on)
         rospy.Service("~get_joint", srv.GetJoint, self._get_joint)
         rospy.Service("~set_joints", srv.SetJoints, self._set_joints)
         rospy.Service("~stop", Trigger, self._stop)
@@ -108,7 +113,11 @@ class ControlEngineNode:
         if now == self._published and time.monotonic() - self._published_s < self._settings.status_period:
             return
         self._published, self._published_s = now, time.monotonic()
-        self._status.publish(messages.engine_status_to_message(*now, self._stamp))
+        message = messages.engine_status_to_message(*now, self._stamp)
+        if self._engine.status.paused:
+            held = self._engine.body.held_poses()
+            message.held = [messages.held_tube_to_message(tube, pose) for tube, pose in held.items()]
+        self._status.publish(message)
 
     def _execute_strategy(self, request: srv.ExecuteStrategyRequest) -> srv.ExecuteStrategyResponse:
         tubes = messages.tubes_from_messages(request.tubes)
@@ -120,13 +129,23 @@ class ControlEngineNode:
                     raise ControlError(EngineCode.INVALID_VALUE, problem)
                 # rospy hands a uint8[] over as bytes.
                 balls = dict(zip((tube.name for tube in request.tubes), bytes(request.balls)))
-                self._engine.start(actions, tubes, balls, request.pour or self._settings.default_pour)
+                pour = request.pour or self._settings.default_pour
+                self._engine.start(actions, tubes, balls, pour, request.pause_after_pours)
             except ControlError as error:
                 return srv.ExecuteStrategyResponse(messages.engine_code_number(error.code), error.message, self._strategy_id)
             self._strategy_id += 1
             self._publish_status()
             rospy.loginfo("strategy %d: %d actions", self._strategy_id, len(actions))
             return srv.ExecuteStrategyResponse(msg.EngineStatus.OK, "", self._strategy_id)
+
+    def _go_on(self, request: srv.GoOnRequest) -> srv.GoOnResponse:
+        with self._lock:
+            try:
+                self._engine.go_on(request.put_down)
+            except ControlError as error:
+                return srv.GoOnResponse(messages.engine_code_number(error.code), error.message)
+            self._publish_status()
+            return srv.GoOnResponse(msg.EngineStatus.OK, "")
 
     def _get_joint(self, request: srv.GetJointRequest) -> srv.GetJointResponse:
         with self._lock:
@@ -161,7 +180,13 @@ def _serve() -> int:
     parameters = private_parameters()
     where = f"{rospy.get_name()} parameters"
     node_settings = build(EngineNodeSettings, take(parameters, "node"), f"{where} node")
-    engine = ControlEngine(ControlSettings.from_mapping(parameters, where), load_pieces(), ArmNetwork.load())
+    calibrations = {}
+    if node_settings.arm_calibration:
+        folder = resolve(node_settings.arm_calibration)
+        calibrations = {hand: load_calibration(folder, hand) for hand in HANDS}
+        found = [hand for hand in HANDS if calibration_file(folder, hand).exists()]
+        rospy.loginfo("arm calibrations in %s: %s", folder, ", ".join(found) or "none, the arms are taken to be as drawn")
+    engine = ControlEngine(ControlSettings.from_mapping(parameters, where), load_pieces(), ArmNetwork.load(), calibrations)
     return ControlEngineNode(engine, node_settings).serve()
 
 

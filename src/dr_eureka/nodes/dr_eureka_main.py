@@ -1,27 +1,28 @@
-"""ROS node that plays the game: reads the card, plans, locates the tubes, has the control engine carry the plan out."""
+"""ROS node that plays the game: reads card and tubes, plans, has the control engine carry the plan out, and looks again."""
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass, field
-from typing import Sequence
+from typing import Mapping
 
+import numpy as np
 import rospy
 
-from dr_eureka import msg
+from dr_eureka import srv
 from dr_eureka.behaviour.flow_settings import FlowSettings
-from dr_eureka.behaviour.game_flow import GameFlow, Looks
-from dr_eureka.behaviour.looks import CardFinding, CardLook, ResultLook, TubeLook, TubesFinding
+from dr_eureka.behaviour.game_flow import GameFlow
+from dr_eureka.behaviour.looks import CardLook, Looks, TubeLook
 from dr_eureka.behaviour.observation import Frame, Observation
-from dr_eureka.behaviour.report import GameCode, GameReport, Phase
+from dr_eureka.behaviour.report import GameCode
 from dr_eureka.control.codes import POUR_METHODS
-from dr_eureka.game.actions import Action
-from dr_eureka.game.state import Pour, State
-from dr_eureka.nodes import messages
+from dr_eureka.game.planner import STRATEGIES, Planner
+from dr_eureka.nodes.announcer import Announcer
 from dr_eureka.nodes.bag_check import check_bag
 from dr_eureka.nodes.engine_client import EngineClient
 from dr_eureka.nodes.folders import resolve
-from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, take_choice, take_count, take_state, take_state_unless
+from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, take_choice, take_count, take_state_unless
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.nodes.sight import TRANSPORTS, Sight, SightSettings
 from dr_eureka.pieces import load_pieces
@@ -29,10 +30,9 @@ from dr_eureka.settings import build
 from dr_eureka.vision.cards import CardReader, CardSettings
 from dr_eureka.vision.contents import ContentsReading, ContentsSettings, read_contents
 from dr_eureka.vision.tubes import TubeScene, TubeSettings, locate_tubes
-from dr_eureka.vision.voting import CardVote, TubeVote, VoteSettings
+from dr_eureka.vision.voting import CardVote, LossVote, TubeVote, VoteSettings
 
 NAME = "dr_eureka_main"
-STRATEGIES = ("fewest",)
 _SECONDS = {"min": 0.01, "max": 600.0}
 # Time for the last, latched messages to leave the process before it ends.
 _LINGER_S = 1.0
@@ -54,65 +54,29 @@ class MainSettings:
     replay_backlog: int = field(metadata={"min": 1, "max": 10000})
 
 
-class Announcer:
-    """Publishes what the game flow finds out, latched (`behaviour.game_flow.Listener`)."""
-
-    def __init__(self) -> None:
-        self._card = rospy.Publisher("~card", msg.CardDetection, queue_size=10, latch=True)
-        self._plan = rospy.Publisher("~plan", msg.Plan, queue_size=10, latch=True)
-        self._tubes = rospy.Publisher("~tubes", msg.TubeScene, queue_size=10, latch=True)
-        self._status = rospy.Publisher("~status", msg.GameStatus, queue_size=50, latch=True)
-        self._told: tuple[str, int] = ("", -1)
-
-    def on_card(self, finding: CardFinding) -> None:
-        """Publish the card that was read."""
-        self._card.publish(messages.card_to_message(finding))
-        rospy.loginfo("card: %s (%d images)", finding.state, finding.images)
-
-    def on_plan(self, start: State, goal: State, pours: Sequence[Pour], actions: Sequence[Action]) -> None:
-        """Publish the plan."""
-        plan = msg.Plan(start=str(start), goal=str(goal), strategy=STRATEGIES[0])
-        plan.pours = [messages.pour_to_message(pour) for pour in pours]
-        plan.actions = [messages.action_to_message(action) for action in actions]
-        plan.header.stamp = rospy.get_rostime()
-        self._plan.publish(plan)
-        rospy.loginfo("plan: %s to %s, %d pours, %d actions", start, goal, len(pours), len(actions))
-
-    def on_tubes(self, finding: TubesFinding) -> None:
-        """Publish where the tubes stand."""
-        self._tubes.publish(messages.scene_to_message(finding))
-        places = ", ".join(f"{name} ({place.position[0]:.4f}, {place.position[1]:.4f})" for name, place in finding.tubes.items())
-        rospy.loginfo("tubes: %s", places)
-
-    def on_report(self, report: GameReport) -> None:
-        """Publish where the game stands, and log a new phase."""
-        self._status.publish(messages.report_to_message(report, rospy.get_time()))
-        if (report.phase, report.game) == self._told:
-            return
-        self._told = report.phase, report.game
-        log = rospy.logerr if report.phase == Phase.FAILED else rospy.loginfo
-        ending = f": {report.code}" if report.code != GameCode.UNDECIDED else ""
-        log("game %d of %d: %s%s %s", report.game + 1, report.games, report.phase, ending, report.message)
-
-
 class DrEurekaMain:
     """The Dr. Eureka Main node of the paper's Figure 5.
 
-    ROS Publishers (all latched):
+    ROS Publishers (latched but for the readings and the image):
         * **~status** (dr_eureka/GameStatus): phase, code, what was done; on change and at 2 Hz
-        * **~card** (dr_eureka/CardDetection), **~plan** (dr_eureka/Plan), **~tubes** (dr_eureka/TubeScene)
+        * **~card** (dr_eureka/CardDetection): the card that was decided on; **~card_readings** (dr_eureka/CardDetection):
+          what each image showed, with the reason if no card was read
+        * **~card_image** (sensor_msgs/Image): each reading drawn into its image, only while somebody subscribes
+        * **~plan** (dr_eureka/Plan), **~tubes** (dr_eureka/TubeScene)
     ROS Subscribers:
         * **camera/image_raw** (sensor_msgs/Image; rgb8, bgr8, mono8) or **camera/image_raw/compressed**, only while it
           looks; **camera/camera_info** (sensor_msgs/CameraInfo)
         * **robotis/present_joint_states** (sensor_msgs/JointState): where the head is
         * **control_engine/status** (dr_eureka/EngineStatus)
+    ROS Services:
+        * **~confirm_card** (dr_eureka/ConfirmCard): confirm or correct the card, in phase WAITING_FOR_CONFIRMATION
     ROS Services called:
-        * **control_engine/set_joints**, **control_engine/execute_strategy**
+        * **control_engine/set_joints**, **control_engine/execute_strategy**, **control_engine/go_on**
     ROS Parameters:
-        * **~start** (str): state of the tubes at the beginning, as RR|GG|PP
-        * **~goal** (str): state to reach instead of a card, or `card`: read one
-        * **~games** (int): games to play, each from where the last one ended
-        * **~strategy** (str): fewest; **~pour** (str): lock or direct
+        * **~goal** (str): state to reach instead of a card, such as RR|GG|PP, or `card`: read one
+        * **~games** (int): games to play, each from what the tubes are seen to hold
+        * **~confirm_card** (bool): wait after each card, before any motion of the arms, until a person confirms or corrects it
+        * **~strategy** (str): fewest, fastest or surest; **~pour** (str): lock or direct
         * **~image_transport** (str): raw or compressed
         * **~replay** (bool): command nothing, look at recorded images; **~bag** (str): the recording, checked first
         * **~stay** (bool): go on publishing the result when all games are over
@@ -125,23 +89,32 @@ class DrEurekaMain:
         self._engine = engine
         self._announcer = announcer
         self._settings = settings
+        # Services are answered by threads of their own.
+        self._lock = threading.Lock()
+        rospy.Service("~confirm_card", srv.ConfirmCard, self._confirm_card)
 
     def play(self) -> int:
         """Play until all games are over or the node is shut down; return the exit code."""
         published_s = 0.0
         while not rospy.is_shutdown() and not self._flow.over:
-            self._sight.open(self._flow.report().phase != Phase.PLAYING)
-            try:
-                self._flow.step(self._observe())
-            except Exception as error:  # the engine must be left holding and the scorekeeper told, whatever went wrong
-                rospy.logerr("%s: %s", type(error).__name__, error)
-                self._flow.fail(GameCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}")
+            self._sight.open(self._flow.looking)
+            with self._lock:
+                try:
+                    self._flow.step(self._observe())
+                except Exception as error:  # the engine must be left holding and the scorekeeper told, whatever went wrong
+                    rospy.logerr("%s: %s", type(error).__name__, error)
+                    self._flow.fail(GameCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}")
             if time.monotonic() - published_s > self._settings.status_period:
                 published_s = time.monotonic()
                 self._announcer.on_report(self._flow.report())
             time.sleep(self._settings.period)
         self._sight.open(False)
         return 0 if self._flow.report().code in (GameCode.SOLVED, GameCode.REPLAYED) else 1
+
+    def _confirm_card(self, request: srv.ConfirmCardRequest) -> srv.ConfirmCardResponse:
+        with self._lock:
+            answer = self._flow.confirm_card(request.state)
+        return srv.ConfirmCardResponse(getattr(srv.ConfirmCardResponse, answer.code), answer.message)
 
     def _observe(self) -> Observation:
         return Observation(
@@ -151,6 +124,7 @@ class DrEurekaMain:
             frame=self._sight.take(),
             camera_seen=self._sight.seen,
             camera_problem=self._sight.problem,
+            camera_frozen=self._sight.frozen,
             head=self._sight.head,
         )
 
@@ -164,12 +138,12 @@ def _serve() -> int:
     card_settings = build(CardSettings, take(parameters, "cards"), f"{where} cards")
     contents_settings = build(ContentsSettings, take(parameters, "contents"), f"{where} contents")
     tube_settings = build(TubeSettings, take(parameters, "tubes"), f"{where} tubes")
-    start = take_state(parameters, "start")
     goal = take_state_unless(parameters, "goal", "card")
     games = take_count(parameters, "games", least=1)
     pour = take_choice(parameters, "pour", POUR_METHODS)
     transport = take_choice(parameters, "image_transport", TRANSPORTS)
-    take_choice(parameters, "strategy", STRATEGIES)
+    strategy = take_choice(parameters, "strategy", STRATEGIES)
+    confirm_card = take_choice(parameters, "confirm_card", (False, True))
     replay, stay = take_choice(parameters, "replay", (False, True)), take_choice(parameters, "stay", (False, True))
     bag = str(parameters.pop("bag", ""))
     refuse_rest(parameters)
@@ -182,23 +156,31 @@ def _serve() -> int:
         return locate_tubes(frame.image, frame.camera, frame.base_from_camera, pieces, tube_settings)
 
     def read_balls(frame: Frame, scene: TubeScene) -> ContentsReading:
-        return read_contents(frame.image, frame.camera, frame.base_from_camera, scene.tubes, pieces, contents_settings)
+        return read_contents(
+            frame.image, frame.camera, frame.base_from_camera, scene.tubes, pieces, contents_settings, scene.base_from_sheet
+        )
 
-    announcer = Announcer()
+    def read_held(frame: Frame, held: Mapping[str, np.ndarray]) -> ContentsReading:
+        return read_contents(frame.image, frame.camera, frame.base_from_camera, {}, pieces, contents_settings, held=held)
+
+    announcer = Announcer(strategy)
     engine = None if replay else EngineClient(settings.service_limit)
     flow = GameFlow(
         flow_settings,
-        start=start,
         goal=goal,
         games=games,
+        plan=Planner(strategy, pour).pours,
         pour=pour,
         looks=Looks(
-            card=lambda: CardLook(reader.read, CardVote(votes.card)),
-            tubes=lambda: TubeLook(locate, TubeVote(votes.tubes)),
-            result=lambda: ResultLook(locate, read_balls, TubeVote(votes.tubes), CardVote(votes.contents)),
+            card=lambda: CardLook(reader.read, CardVote(votes.card), announcer.on_card_reading),
+            tubes=lambda: TubeLook(
+                locate, read_balls, TubeVote(votes.tubes), CardVote(votes.contents), LossVote(votes.lost)
+            ),
+            read_held=read_held,
         ),
         listener=announcer,
         robot=engine,
+        confirm_card=confirm_card,
     )
     sight_settings = SightSettings(
         settings.image_max_age,

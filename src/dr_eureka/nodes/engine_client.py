@@ -23,6 +23,7 @@ class EngineClient:
         self._view: Optional[EngineView] = None
         self._set_joints = rospy.ServiceProxy("control_engine/set_joints", srv.SetJoints)
         self._execute_strategy = rospy.ServiceProxy("control_engine/execute_strategy", srv.ExecuteStrategy)
+        self._go_on = rospy.ServiceProxy("control_engine/go_on", srv.GoOn)
         self._stop = rospy.ServiceProxy("control_engine/stop", Trigger)
         rospy.Subscriber("control_engine/status", msg.EngineStatus, self._on_status, queue_size=10)
 
@@ -33,18 +34,29 @@ class EngineClient:
 
     def look_at(self, gaze: Gaze, duration_s: float) -> Answer:
         """Begin to turn the head."""
-        request = srv.SetJointsRequest(["head_y", "head_p"], [gaze.head_y, gaze.head_p], duration_s)
-        return self._ask(self._set_joints, request)
+        return self.move_joints({"head_y": gaze.head_y, "head_p": gaze.head_p}, duration_s)
+
+    def move_joints(self, goals: Mapping[str, float], duration_s: float = 0.0) -> Answer:
+        """Begin to bring joints to positions [rad], as quickly as the engine's limits allow when no duration is given."""
+        return self._ask(self._set_joints, srv.SetJointsRequest(list(goals), list(goals.values()), duration_s))
 
     def execute(self, actions: Sequence[Action], tubes: Mapping[str, Any], balls: Mapping[str, int], pour: str) -> Answer:
-        """Begin a strategy; `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds."""
+        """Begin a strategy that pauses after each pour but the last.
+
+        `tubes` are `vision.tubes.TubePlace` by name, `balls` how many each tube holds.
+        """
         request = srv.ExecuteStrategyRequest(
             actions=[messages.action_to_message(action) for action in actions],
             tubes=[messages.tube_to_message(name, place.position, place.sigma_m) for name, place in tubes.items()],
             balls=bytes(balls[name] for name in tubes),
             pour=pour,
+            pause_after_pours=True,
         )
         return self._ask(self._execute_strategy, request)
+
+    def go_on(self, put_down: bool) -> Answer:
+        """End the engine's pause after a pour: carry the strategy on, or put down what is held and leave the rest."""
+        return self._ask(self._go_on, srv.GoOnRequest(put_down))
 
     def stop(self) -> Answer:
         """Stop whatever moves, and hold."""

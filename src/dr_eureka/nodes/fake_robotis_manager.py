@@ -26,10 +26,11 @@ from dr_eureka.nodes.runner import run_node
 from dr_eureka.pieces import load_pieces
 from dr_eureka.settings import build
 from dr_eureka.simulation.card_holder import CardChange, CardHolder
+from dr_eureka.simulation.faults import Fault, PourSpoiler
 from dr_eureka.simulation.joints import ALL_JOINTS
 from dr_eureka.simulation.manager import Refusal, RobotisManager
 from dr_eureka.simulation.rendering import SceneTextures
-from dr_eureka.simulation.settings import CameraSettings, WorldSettings
+from dr_eureka.simulation.settings import CameraSettings, SimulationError, WorldSettings
 from dr_eureka.simulation.world import World
 from dr_eureka.vision.camera import CameraModel
 from dr_eureka.vision.card_renderer import render_card
@@ -37,6 +38,8 @@ from dr_eureka.vision.sheet_renderer import sheet_image
 
 NAME = "fake_robotis_manager"
 _SHOW_LIMIT_S = 10.0
+# While the robot waits for a person's word about the card, the person leaves it where it is.
+_CARD_PHASES = (Phase.LOOKING_FOR_CARD, Phase.WAITING_FOR_CONFIRMATION)
 # A simulation that fell this far behind the wanted pace does not race to catch up.
 _LARGEST_LAG_S = 0.2
 
@@ -71,6 +74,7 @@ class FakeRobotisManager:
         * **dr_eureka_main/status** (dr_eureka/GameStatus): a card is shown when the robot looks for one
     ROS Services:
         * **~show_card** (dr_eureka/ShowCard)
+        * **~spoil_pour** (dr_eureka/SpoilPour): let the next pour go wrong; for tests only
     ROS Parameters:
         * **~start** (str): state of the tubes; **~seed** (int): draws everything random
         * **~card** (str): state on the first card, or `random`: drawn from the seed
@@ -78,9 +82,11 @@ class FakeRobotisManager:
         * world, camera, node: see config/fake_robotis_manager.yaml
     """
 
-    def __init__(self, world: World, camera: CameraModel, cards: CardHolder, seed: int, factor: float, cycle_s: float,
-                 settings: ManagerNodeSettings):
+    def __init__(self, world: World, start: State, camera: CameraModel, cards: CardHolder, seed: int, factor: float,
+                 cycle_s: float, settings: ManagerNodeSettings):
         self._world = world
+        self._start = start
+        self._spoiler = PourSpoiler(world, load_pieces())
         self._camera = camera
         self._cards = cards
         self._seed = seed
@@ -110,6 +116,7 @@ class FakeRobotisManager:
         self._listen("robotis/set_joint_ctrl_modules", msg.JointCtrlModule, self._set_joint_modules)
         self._listen("dr_eureka_main/status", msg.GameStatus, self._follow_game)
         rospy.Service("~show_card", srv.ShowCard, self._show_card)
+        rospy.Service("~spoil_pour", srv.SpoilPour, self._spoil_pour)
 
     def _listen(self, topic: str, kind: type, react: Callable) -> None:
         """Subscribe to a topic whose messages are dealt with between two cycles."""
@@ -120,6 +127,9 @@ class FakeRobotisManager:
         while not rospy.is_shutdown():
             self._world.advance_cycle()
             self._cycle += 1
+            fault = self._spoiler.step()
+            if fault:
+                rospy.logwarn("spoilt a pour as asked: %s", fault.name)
             # From whole nanoseconds, so that an answer's stamp compares equal.
             stamp = rospy.Time(0, self._cycle * round(self._cycle_s * 1e9))
             self._lock_step.expect(stamp.to_nsec())
@@ -141,7 +151,8 @@ class FakeRobotisManager:
         return self._cycle % max(1, round(1.0 / (rate_hz * self._cycle_s))) == 0
 
     def _publish_joints(self, stamp: rospy.Time) -> None:
-        for publisher, angles in ((self._present, self._world.joint_positions()), (self._goal, self._world.joint_goals())):
+        for publisher, true in ((self._present, self._world.joint_positions()), (self._goal, self._world.joint_goals())):
+            angles = self._spoiler.noticed(true)
             state = JointState(name=list(ALL_JOINTS), position=[angles[name] for name in ALL_JOINTS])
             # The stock robot reads neither velocity nor effort, but sends them at full length.
             state.velocity = state.effort = [0.0] * len(ALL_JOINTS)
@@ -174,7 +185,7 @@ class FakeRobotisManager:
         goals, refusals = self._manager.set_joint_states(command.name, command.position)
         self._log("set_joint_states", refusals)
         if goals:
-            self._world.set_joint_goals(goals)
+            self._world.set_joint_goals(self._spoiler.pushed(goals))
 
     @staticmethod
     def _log(topic: str, refusals: Sequence[Refusal]) -> None:
@@ -200,7 +211,8 @@ class FakeRobotisManager:
     def _follow_game(self, status: msg.GameStatus) -> None:
         try:
             report = messages.report_from_message(status)
-            change = self._cards.follow(report.phase == Phase.LOOKING_FOR_CARD, report.game, State.parse(report.start))
+            present = State.parse(report.start) if report.start else self._start
+            change = self._cards.follow(report.phase in _CARD_PHASES, report.game, present)
         except DrEurekaError as error:
             rospy.logerr_throttle_identical(1.0, f"dr_eureka_main/status: {error}")
             return
@@ -230,6 +242,17 @@ class FakeRobotisManager:
             return srv.ShowCardResponse(False, f"the simulation did not react within {_SHOW_LIMIT_S:g} s")
         return srv.ShowCardResponse(True, "")
 
+    def _spoil_pour(self, request: srv.SpoilPourRequest) -> srv.SpoilPourResponse:
+        try:
+            if len(request.joints) != len(request.offsets):
+                sizes = f"{len(request.joints)} joints and {len(request.offsets)} offsets"
+                raise SimulationError(f"jog: {sizes}; expected one each")
+            fault = Fault(request.fault, dict(zip(request.joints, request.offsets)), request.seconds)
+        except DrEurekaError as error:
+            return srv.SpoilPourResponse(False, str(error))
+        self._notes.put(partial(self._spoiler.spoil_next_pour, fault))
+        return srv.SpoilPourResponse(True, "")
+
     def _keep_pace(self) -> None:
         """Hold the simulation back to the wanted real-time factor."""
         if self._factor <= 0.0:
@@ -258,7 +281,7 @@ def _serve() -> int:
     model = CameraModel(camera.width, camera.height, matrix, camera.distortion)
     try:
         return FakeRobotisManager(
-            world, model, CardHolder(seed, card), seed, factor, world_settings.cycle, node_settings
+            world, start, model, CardHolder(seed, card), seed, factor, world_settings.cycle, node_settings
         ).run()
     finally:
         world.close()

@@ -7,20 +7,25 @@ from typing import Sequence
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
+from std_msgs.msg import Header
 
 from dr_eureka import msg
-from dr_eureka.behaviour.looks import CardFinding, TubesFinding
-from dr_eureka.behaviour.observation import EngineView
+from dr_eureka.behaviour.looks import TubesFinding
+from dr_eureka.behaviour.observation import EngineView, ImageHeader
 from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Phase
 from dr_eureka.control.codes import EngineCode, EngineState
 from dr_eureka.control.engine import EngineStatus
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.actions import Action
 from dr_eureka.game.state import Pour
-from dr_eureka.kinematics.transforms import matrix_to_quaternion
+from dr_eureka.kinematics.transforms import matrix_to_quaternion, quaternion_to_matrix, transform
+from dr_eureka.vision.card_drawing import balls_in_image
+from dr_eureka.vision.cards import CardReading
 
 BASE_FRAME = "base"
 CAMERA_FRAME = "cam_link"
+
+
 class MessageError(DrEurekaError):
     """A message that carries a value its definition does not know."""
 
@@ -49,6 +54,7 @@ def engine_status_to_message(status: EngineStatus, strategy_id: int, time: rospy
         strategy_id=strategy_id,
         action_index=status.action_index,
         message=status.message,
+        paused=status.paused,
     )
     message.header.stamp = time
     return message
@@ -64,6 +70,7 @@ def engine_view(status: msg.EngineStatus, heard_wall_s: float) -> EngineView:
         action_index=status.action_index,
         message=status.message,
         heard_wall_s=heard_wall_s,
+        held={tube.name: pose_from_message(tube.pose) for tube in status.held},
     )
 
 
@@ -111,28 +118,43 @@ def tubes_from_messages(messages: Sequence[msg.TubePlace]) -> dict[str, np.ndarr
     return {tube.name: np.array([tube.position.x, tube.position.y, tube.position.z]) for tube in messages}
 
 
+def held_tube_to_message(name: str, base_from_tube: np.ndarray) -> msg.HeldTube:
+    """Return a tube in a hand, pose (4, 4) in base, as its message."""
+    return msg.HeldTube(name=name, pose=pose_to_message(base_from_tube))
+
+
+def pose_from_message(pose: Pose) -> np.ndarray:
+    """Return a pose as a (4, 4) transform."""
+    turn, place = pose.orientation, pose.position
+    return transform(quaternion_to_matrix([turn.x, turn.y, turn.z, turn.w]), [place.x, place.y, place.z])
+
+
 def pose_to_message(transform: np.ndarray) -> Pose:
     """Return a (4, 4) transform as a pose."""
     return Pose(Point(*transform[:3, 3]), Quaternion(*matrix_to_quaternion(transform[:3, :3])))
 
 
-def card_to_message(finding: CardFinding) -> msg.CardDetection:
-    """Return a card that was read as its message."""
-    reading = finding.reading
-    detection = msg.CardDetection(
-        result=msg.CardDetection.OK,
-        state=str(finding.state),
+def card_to_message(reading: CardReading, header: ImageHeader, images: int) -> msg.CardDetection:
+    """Return what was read in the image of this header, the decision of so many, as its message."""
+    return msg.CardDetection(
+        header=header_to_message(header),
+        result=getattr(msg.CardDetection, reading.result),
+        state=reading.state or "",
         confidence=float(reading.confidence),
         corners=[] if reading.corners is None else np.asarray(reading.corners, dtype=float).ravel().tolist(),
-        images=finding.images,
+        balls=[msg.CardBall(ball.colour, ball.x, ball.y, ball.diameter, ball.confidence) for ball in balls_in_image(reading)],
+        images=images,
+        reason=reading.reason,
     )
-    detection.header.stamp = stamp(finding.stamp_s)
-    detection.header.frame_id = CAMERA_FRAME
-    return detection
+
+
+def header_to_message(header: ImageHeader) -> Header:
+    """Return an image's header as its message; the stamp is the image's to the nanosecond."""
+    return Header(stamp=rospy.Time(0, header.stamp_ns), frame_id=header.frame_id)
 
 
 def scene_to_message(finding: TubesFinding) -> msg.TubeScene:
-    """Return located tubes as their message."""
+    """Return located tubes and what they hold as their message."""
     scene = finding.scene
     message = msg.TubeScene(
         result=msg.TubeScene.OK,
@@ -140,8 +162,9 @@ def scene_to_message(finding: TubesFinding) -> msg.TubeScene:
         sheet=pose_to_message(scene.base_from_sheet),
         markers_seen=list(scene.markers_seen),
         images=finding.images,
+        state=str(finding.state),
     )
-    message.header.stamp = stamp(finding.stamp_s)
+    message.header.stamp = header_to_message(finding.header).stamp
     message.header.frame_id = BASE_FRAME
     return message
 
@@ -160,6 +183,7 @@ def report_to_message(report: GameReport, now_s: float) -> msg.GameStatus:
         game=report.game,
         games=report.games,
         start=report.start,
+        card=report.card,
         goal=report.goal,
         pours=[pour_to_message(pour) for pour in report.pours],
         actions=[
@@ -188,6 +212,7 @@ def report_from_message(status: msg.GameStatus) -> GameReport:
         game=status.game,
         games=status.games,
         start=status.start,
+        card=status.card,
         goal=status.goal,
         pours=pours_from_messages(status.pours),
         actions=tuple(

@@ -13,13 +13,16 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
 from dr_eureka.bags.images import ImageError, camera_from_info, rgb_from_compressed, rgb_from_image
 from dr_eureka.behaviour.head_history import HeadHistory
-from dr_eureka.behaviour.observation import Frame, Gaze
+from dr_eureka.behaviour.observation import Frame, Gaze, ImageHeader
 from dr_eureka.kinematics.arms import head_chain
 from dr_eureka.vision.camera import CameraError
+from dr_eureka.vision.voting import RepeatedPictures
 
 TRANSPORTS = ("raw", "compressed")
 # An image this much older than the last one is not late: a recording has begun again.
 _JUMP_BACK_S = 1.0
+# Least robot time between two lines of the log about images that are dropped [s].
+_COMPLAINT_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,9 @@ class SightSettings:
 class Sight:
     """The images of `camera/image_raw`, each with calibration and pose.
 
-    An image is usable when it decodes, is newer than the last, fits the calibration of `camera/camera_info`, and when
-    `robotis/present_joint_states` tell where the head was at its stamp and that it was at rest. Otherwise `problem`
-    says what is wrong in one line.
+    An image is usable when it decodes, is newer than the last and not the same picture, fits the calibration of
+    `camera/camera_info`, and when `robotis/present_joint_states` tell where the head was at its stamp and that it was at
+    rest. Otherwise `problem` says what is wrong in one line; `frozen` tells that images come, but nothing new in them.
     """
 
     def __init__(self, settings: SightSettings, transport: str):
@@ -54,10 +57,12 @@ class Sight:
         self._pending: deque[tuple[float, float, Image | CompressedImage]] = deque(maxlen=settings.backlog)
         self._info: Optional[CameraInfo] = None
         self._last_stamp_s = 0.0
+        self._repeated = RepeatedPictures()
         self._compressed = transport == "compressed"
         self._topic = "camera/image_raw/compressed" if self._compressed else "camera/image_raw"
         self._subscriber: Optional[rospy.Subscriber] = None
         self.seen = False
+        self.frozen = False
         self.problem = f"no image on {rospy.resolve_name(self._topic)}"
         rospy.Subscriber("camera/camera_info", CameraInfo, self.hear_info, queue_size=1)
         rospy.Subscriber("robotis/present_joint_states", JointState, self.hear_joints, queue_size=10, tcp_nodelay=True)
@@ -91,16 +96,20 @@ class Sight:
                 return None
             self._pending.popleft()
         if info is None:
-            self.problem = f"no calibration on {rospy.resolve_name('camera/camera_info')}"
+            self._drop(f"no calibration on {rospy.resolve_name('camera/camera_info')}")
             return None
         try:
             camera = camera_from_info(info)
             image = rgb_from_compressed(message) if self._compressed else rgb_from_image(message)
             camera.check_size(image)
         except (ImageError, CameraError) as error:
-            self.problem = str(error)
+            self._drop(str(error))
             return None
         self.seen = True
+        if self._repeated.add(image):
+            self._drop(f"image of {stamp_s:.3f} s repeats the one before pixel by pixel", frozen=True)
+            return None
+        self.frozen = False
         if joints is None:
             self.problem = f"no joint state of the image's time {stamp_s:.3f} s"
             return None
@@ -108,7 +117,14 @@ class Sight:
             self.problem = "no image with the head at rest"
             return None
         self.problem = "no new image"
-        return Frame(stamp_s, image, camera, self._chain.forward(joints))
+        header = ImageHeader(message.header.stamp.to_nsec(), message.header.frame_id)
+        return Frame(header, image, camera, self._chain.forward(joints))
+
+    def _drop(self, problem: str, frozen: bool = False) -> None:
+        """Note why an image cannot be used, and say so in the log now and then."""
+        self.problem = problem
+        self.frozen = frozen
+        rospy.logwarn_throttle(_COMPLAINT_S, "image dropped: %s", problem)
 
     def _waits_for_joints(self, stamp_s: float, arrived_s: float) -> bool:
         newest_s = self._history.newest_s
@@ -131,12 +147,12 @@ class Sight:
         stamp_s, now_s = message.header.stamp.to_sec(), rospy.get_time()
         with self._lock:
             if stamp_s <= 0.0:
-                self.problem = "image without a time stamp"
+                self._drop("image without a time stamp")
             elif self._last_stamp_s - _JUMP_BACK_S < stamp_s <= self._last_stamp_s:
-                self.problem = f"image of {stamp_s:.3f} s, not newer than the last of {self._last_stamp_s:.3f} s"
+                self._drop(f"image of {stamp_s:.3f} s, not newer than the last of {self._last_stamp_s:.3f} s", frozen=True)
             elif now_s > 0.0 and abs(now_s - stamp_s) > self._settings.image_max_age:
                 limit_s = self._settings.image_max_age
-                self.problem = f"image of {stamp_s:.3f} s at {now_s:.3f} s: older or newer than {limit_s:g} s"
+                self._drop(f"image of {stamp_s:.3f} s at {now_s:.3f} s: older or newer than {limit_s:g} s")
             else:
                 self._last_stamp_s = stamp_s
                 self._pending.append((time.monotonic(), stamp_s, message))

@@ -1,4 +1,4 @@
-"""One decision from many images: which card is shown, and where the tubes stand.
+"""One decision from many images: which card is shown, where the tubes stand, what they hold, whether a ball is lost.
 
 The game node and `replay_bag` decide through these classes, so a recording leads to what the robot decided.
 """
@@ -10,8 +10,10 @@ from typing import Optional
 
 import numpy as np
 
+from dr_eureka.game.state import BALLS_PER_COLOUR, COLOUR_NAMES
 from dr_eureka.settings import SettingsError
 from dr_eureka.vision.cards import CardReading, CardResult
+from dr_eureka.vision.contents import ContentsReading, ContentsResult
 from dr_eureka.vision.tubes import TubePlace, TubeResult, TubeScene
 
 #: Result of a vote that ran out of images while usable ones disagreed.
@@ -57,6 +59,23 @@ class VoteSettings:
     card: CardVoteSettings
     tubes: TubeVoteSettings
     contents: CardVoteSettings
+    lost: CardVoteSettings
+
+
+class RepeatedPictures:
+    """Notices a picture that repeats the one before pixel by pixel: of a frozen camera, it is no further evidence.
+
+    Two pictures of a living camera always differ by the noise of its sensor.
+    """
+
+    def __init__(self) -> None:
+        self._last: Optional[np.ndarray] = None
+
+    def add(self, image: np.ndarray) -> bool:
+        """Take one more picture; return whether it repeats the last."""
+        repeats = self._last is not None and np.array_equal(self._last, image)
+        self._last = image
+        return repeats
 
 
 class CardVote:
@@ -113,6 +132,30 @@ class TubeVote:
         """Return why no places were found: a result code and one line about the newest images."""
         failures = [(scene.result, scene.reason) for scene in self._newest if scene.result != TubeResult.OK]
         return _undecided([scene.result for scene in self._newest], failures, self._settings.agree)
+
+
+class LossVote:
+    """Wait until enough of the newest images show the same balls lost: beside the tubes, or nowhere although all is seen."""
+
+    def __init__(self, settings: CardVoteSettings) -> None:
+        self._settings = settings
+        self._newest: deque[str] = deque(maxlen=settings.window)
+
+    def add(self, reading: ContentsReading) -> Optional[str]:
+        """Take the reading of one more image; return one line about what is lost if that won, else None."""
+        lost = _lost(reading)
+        self._newest.append(lost)
+        return lost if lost and self._newest.count(lost) >= self._settings.agree else None
+
+
+def _lost(reading: ContentsReading) -> str:
+    """Say which balls are in no tube, without what differs from image to image; empty if none is known to be."""
+    in_tubes = Counter("".join(contents.colours for contents in reading.tubes.values()))
+    # Something else of a ball's colour may lie on the table while a tube is covered.
+    beside = sorted(ball.colour for ball in reading.loose if in_tubes[ball.colour] < BALLS_PER_COLOUR)
+    if beside:
+        return f"{', '.join(COLOUR_NAMES[colour] for colour in beside)} seen lying beside the tubes"
+    return reading.reason if reading.result == ContentsResult.BALL_MISSING else ""
 
 
 def _undecided(outcomes: list[str], failures: list[tuple[str, str]], agree: int) -> tuple[str, str]:
