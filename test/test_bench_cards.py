@@ -8,7 +8,10 @@ import pytest
 
 from dr_eureka.bench import cards_plots, cards_speed
 from dr_eureka.bench.cards_breakdown import breakdown, state_rows
-from dr_eureka.bench.cards_map import HeldOut, detect_held_out, held_out_crop, map_rows, match_balls, weighted_precision
+from dr_eureka.bench.cards_map import (
+    HeldOut, detect_held_out, far_rows, held_out_crop, map_rows, match_balls, weighted_precision,
+)
+from dr_eureka.bench.cards_refusals import KINDS, refusal_rows, refusal_scene
 from dr_eureka.bench.cards_samples import draw_samples
 from dr_eureka.bench.cards_states import SERIES, STATES, Trial, run_trials, scene_of
 from dr_eureka.vision.card_detections import CropDetections, SeenBall
@@ -74,12 +77,11 @@ def test_mean_average_precision_has_a_row_a_colour_an_interval_and_a_comparison(
     assert map_rows(found, 1) == list(rows.values())
 
 
-def test_a_network_without_weights_has_rows_without_a_value_or_a_verdict(truth):
-    rows = map_rows(HeldOut(truth, {"eureka": perfect(truth)}), 1)
-    without = [row for row in rows if row.value is None]
-    assert [row.name for row in without] == [
-        "mAP@0.5, YOLOv2-tiny (no weights shipped)", "mAP@0.5, ours less YOLOv2-tiny (no weights shipped)"]
-    assert all(row.ok is None for row in without)
+def test_far_crops_are_told_but_not_judged(truth):
+    rows = far_rows(HeldOut(truth, {"eureka": guessed(truth, 1), "tiny": perfect(truth)}), 1)
+    assert [row.name.removesuffix(", far outside training") for row in rows] == [
+        "mAP@0.5, YOLO-Dr. Eureka", "mAP@0.5, YOLOv2-tiny", "mAP@0.5, ours less YOLOv2-tiny"]
+    assert all((row.goal, row.ok, row.paper) == (None, None, None) for row in rows)
 
 
 def test_held_out_crops_follow_from_seed_and_number():
@@ -146,6 +148,22 @@ def test_every_trial_is_in_one_bin_of_each_thing_that_varies():
     for bins in parts.values():
         assert sorted(trial.view for part in bins for trial in part.trials) == [0, 1, 2, 3]
     assert [len(part.trials) for part in parts["turn"]] == [1, 0, 0, 0, 2, 0, 0, 1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_may_be_read_in_a_scene_is_what_it_shows(kind):
+    for index in range(12):
+        image, shown = refusal_scene(kind, 1, index)
+        again, _ = refusal_scene(kind, 1, index)
+        assert image.shape == (480, 640, 3) and np.array_equal(image, again)
+        assert len(shown) == {"impossible card": 0, "two cards": 2}.get(kind, 1)
+        assert set(shown) <= set(STATES)
+
+
+def test_every_kind_is_counted_and_all_wrong_readings_are_judged_together():
+    rows = refusal_rows(1, 2)
+    assert [row.name for row in rows[:-1]] == [f"{kind}: {what}" for kind in KINDS for what in ("refused", "OK and wrong")]
+    assert (rows[-1].n, rows[-1].value, rows[-1].ok) == (8, 0.0, True)
 
 
 def test_parameters_are_those_of_the_layers():

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 import torch
 
+from dr_eureka.cli.train_card_detector import main
 from dr_eureka.vision.card_architecture import (
     GRID, RAW_CHANNELS, build_network, parameter_count, to_arrays,
 )
@@ -11,7 +12,7 @@ from dr_eureka.vision.card_metrics import average_precision, box_overlap, mean_a
 from dr_eureka.vision.card_network import CardNetwork, decode
 from dr_eureka.vision.card_stream import CardStream
 from dr_eureka.vision.card_targets import detection_loss, encode
-from dr_eureka.vision.card_training import CHECKPOINT, TrainingPlan, main, train
+from dr_eureka.vision.card_training import CHECKPOINT, TrainingPlan, train
 from dr_eureka.vision.card_weights import load_detector, save_detector
 
 

@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dr_eureka.bench.cards_breakdown import state_rows
-from dr_eureka.bench.cards_map import CROPS, TITLES, HeldOut, detect_held_out, map_rows, match_balls
+from dr_eureka.bench.cards_map import (
+    CROPS, FAR_CROPS, TITLES, HeldOut, detect_held_out, far_rows, map_rows, match_balls,
+)
+from dr_eureka.bench.cards_refusals import REFUSALS, refusal_rows
 from dr_eureka.bench.cards_speed import network_speed_rows, parameter_rows, reading_speed_rows
 from dr_eureka.bench.cards_states import SERIES, Trial, run_trials
 from dr_eureka.bench.report import BenchOptions, Row
 from dr_eureka.game.state import COLOURS
-from dr_eureka.resources import WEIGHTS_FOLDER, WeightsError, resource_path
+from dr_eureka.resources import WEIGHTS_FOLDER, resource_path
 from dr_eureka.vision.card_weights import load_detector, log_name
 
 _ROUNDS = 200
@@ -20,20 +23,15 @@ _ROUNDS = 200
 def run(options: BenchOptions) -> list[Row]:
     """Measure both detectors and the card reader; trials: views of each state in every series, instead of the series' own.
 
-    Raises WeightsError when our own detector's weights cannot be loaded; without the baseline's its rows have no value.
+    Raises WeightsError when a detector's weights cannot be loaded.
     """
     # torch takes seconds to import
     from dr_eureka.vision.card_network import CardNetwork
 
-    networks = {}
-    for model in TITLES:
-        try:
-            networks[model] = CardNetwork(load_detector(model), 1, model)
-        except WeightsError:
-            if model == "eureka":
-                raise
+    networks = {model: CardNetwork(load_detector(model), 1, model) for model in TITLES}
     found = detect_held_out(networks, options.seed, CROPS)
     rows = map_rows(found, options.seed)
+    rows += far_rows(detect_held_out(networks, options.seed, FAR_CROPS, far=True), options.seed)
     rows += parameter_rows()
     rows += network_speed_rows(options.seed, _ROUNDS)
     rows += reading_speed_rows(options.seed, _ROUNDS)
@@ -42,6 +40,7 @@ def run(options: BenchOptions) -> list[Row]:
         views = options.trials or series.views_a_state
         tables[series.name] = run_trials(series, options.seed, views, options.processes)
         rows += state_rows(series, tables[series.name])
+    rows += refusal_rows(options.seed, REFUSALS)
     if options.out is not None:
         rows += _draw(options.out, options.seed, found, tables)
     return rows

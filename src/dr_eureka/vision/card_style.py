@@ -70,7 +70,7 @@ _RANGES = {
         outline=((0.006, 0.014),), outline_level=((180, 255),), ground_level=((8, 50),), streaks=((0, 40),),
         gloss=((0.3, 1.0),), shine_spread=np.pi, colour_shift=((0, 22),), closest_feet=0.96,
     ),
-    "held_out": _StyleRanges(
+    "far": _StyleRanges(
         border=((0.032, 0.04), (0.095, 0.105)), corner_radius=((0.01, 0.02), (0.07, 0.09)),
         ball_diameter=((0.098, 0.105), (0.15, 0.155)), tube_height=((4.3, 4.5), (4.9, 5.1)),
         tube_width=((1.08, 1.12), (1.3, 1.36)), foot_width=((1.42, 1.5), (1.85, 1.95)), ball_pitch=((1.03, 1.05),),
@@ -78,20 +78,20 @@ _RANGES = {
         streaks=((40, 60),), gloss=((0.0, 0.3),), shine_spread=np.pi, colour_shift=((22, 28),), closest_feet=0.96,
     ),
 }
-_OUTSIDE = 2  # figures of a held-out style that lie outside of training's
 _FIGURES = ("border", "corner_radius", "ball_diameter", "tube_height", "tube_width", "foot_width", "ball_pitch", "outline",
             "outline_level", "ground_level", "streaks", "gloss", "colour_shift")
 
 
 def sample_style(rng: np.random.Generator, look: str = "real") -> CardStyle:
-    """Return a random style of a look: `real`, `training` (wider), or `held_out` (two figures outside of training's).
+    """Return a random style of a look.
 
-    What the geometry ties together, spacing and place of the tubes, follows from the other figures. Raises KeyError for
-    any other look.
+    Looks: `real`; `training`, wider; outside of training's in two figures, `held_out`, or in all, `far`. What the
+    geometry ties together, spacing and place of the tubes, follows from the other figures. Raises KeyError for any other
+    look.
     """
-    ranges = _RANGES[look]
+    ranges = _RANGES["far" if look == "held_out" else look]
     if look == "held_out":
-        chosen = rng.choice(_FIGURES, _OUTSIDE, replace=False)
+        chosen = rng.choice(_FIGURES, 2, replace=False)
         ranges = replace(_RANGES["training"], **{name: getattr(ranges, name) for name in chosen})
     border, diameter = draw(rng, ranges.border), draw(rng, ranges.ball_diameter)
     foot_width, tube_height = draw(rng, ranges.foot_width), draw(rng, ranges.tube_height)

@@ -39,7 +39,7 @@ class View:
 class ViewRanges:
     """What views are drawn from; names and units as in View.
 
-    With `usual` given, a view takes one of its quantities from these ranges and all others from the usual ones.
+    With `usual` given, a view takes `outside` of its quantities from these ranges and all others from the usual ones.
     """
 
     side_px: Bands = ((75.0, 330.0),)
@@ -55,14 +55,16 @@ class ViewRanges:
     jpeg_share: float = 0.6
     glare_share: float = 0.15
     usual: ViewRanges | None = None
+    outside: int = 1
 
 
 TRAINING_VIEWS = ViewRanges()
-# Outside of training's in one of these six at a time: all at once would leave nothing to see.
+# Outside of training's in one or two of six quantities at a time: all at once would leave nothing to see.
 HELD_OUT_VIEWS = ViewRanges(
     side_px=((62.0, 75.0), (330.0, 380.0)), tilt=((0.8, 0.92),), exposure=((0.42, 0.5), (2.0, 2.3)), motion_px=((5.0, 6.5),),
     motion_share=1.0, noise=((9.0, 12.0),), jpeg=((25.0, 35.0),), jpeg_share=1.0, usual=TRAINING_VIEWS,
 )
+FAR_VIEWS = replace(HELD_OUT_VIEWS, outside=2)
 _HELD_OUT = ("side_px", "tilt", "exposure", "motion_px", "noise", "jpeg")
 
 
@@ -70,8 +72,8 @@ def sample_view(rng: np.random.Generator, ranges: ViewRanges) -> View:
     """Return a random view."""
     if ranges.usual is not None:
         outside = sample_view(rng, replace(ranges, usual=None))
-        chosen = str(rng.choice(_HELD_OUT))
-        return replace(sample_view(rng, ranges.usual), **{chosen: getattr(outside, chosen)})
+        chosen = rng.choice(_HELD_OUT, ranges.outside, replace=False)
+        return replace(sample_view(rng, ranges.usual), **{name: getattr(outside, name) for name in chosen})
     glare = None
     if rng.random() < ranges.glare_share:
         glare = (rng.uniform(0, 1), rng.uniform(0, 1), rng.uniform(0.08, 0.4), rng.uniform(20, 110))
