@@ -106,7 +106,7 @@ class ServicesTest(unittest.TestCase):
     def strategy(self, x):
         tubes = [TubePlace(name, Point(x, y, 0.775), 0.001) for name, y in (("left", 0.11), ("center", 0.0), ("right", -0.11))]
         actions = [Action(kind=Action.PICK, hand="left", tube="left")]
-        return self.services["execute_strategy"](actions, tubes, bytes([2, 2, 2]), "lock")
+        return self.services["execute_strategy"](actions, tubes, bytes([2, 2, 2]), "lock", False)
 
     def test_an_unreachable_tube_has_its_own_code_and_a_strategy_number(self):
         answer = self.strategy(x=1.6)

@@ -35,8 +35,8 @@ def run_node(name: str, description: str, serve: Callable[[], int]) -> int:
         print(f"{rospy.get_name()}: {error}", file=sys.stderr, flush=True)
         return 1
     except rospy.ROSException:
-        # What a node was just publishing or waiting for when it was shut down.
-        if rospy.is_shutdown():
+        # What a node was just publishing or waiting for when its shutdown began: is_shutdown() tells only of the end.
+        if rospy.core.is_shutdown_requested():
             return 0
         raise
     finally:
