@@ -27,7 +27,7 @@ def main(argv: list[str] | None = None) -> int:
                         help="for weights, log and checkpoint; a run that was broken off goes on from there")
     parser.add_argument("--install", action="store_true",
                         help="put the finished weights and their log into the package's config/weights")
-    parser.add_argument("--epochs", type=int, help="in one cycle of the learning rate")
+    parser.add_argument("--epochs", type=int)
     parser.add_argument("--samples", type=int, dest="samples_per_epoch", help="crops an epoch")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--seed", type=int)
@@ -35,9 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--bfloat16", action="store_true", default=None,
                         help="multiply in half precision: twice as fast on processors made for it")
     options = vars(parser.parse_args(argv))
-    model, out, install, epochs = (options.pop(name) for name in ("model", "out", "install", "epochs"))
-    if epochs is not None:
-        options["cycles"] = ((epochs, PLANS[model].cycles[0][1]),)
+    model, out, install = (options.pop(name) for name in ("model", "out", "install"))
     plan = replace(PLANS[model], **{name: value for name, value in options.items() if value is not None})
     if min(plan.epochs, plan.batch, plan.pool) < 1 or plan.samples_per_epoch < plan.batch or plan.seed < 0:
         parser.error("epochs, batch and pool must be at least 1, samples at least a batch, and the seed at least 0")

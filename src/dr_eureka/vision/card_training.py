@@ -32,9 +32,10 @@ CHECKPOINT = "checkpoint.npz"
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """How long and on what to train; cycles: epochs and peak learning rate of each (Loshchilov and Hutter, SGDR, 2017)."""
+    """How long and on what to train."""
 
-    cycles: tuple[tuple[int, float], ...]
+    epochs: int
+    peak_rate: float
     model: str = "eureka"
     samples_per_epoch: int = 2500
     batch: int = 8
@@ -44,25 +45,17 @@ class TrainingPlan:
     averaging: float = 0.99  # of the weights kept for use, per step
     bfloat16: bool = False
 
-    @property
-    def epochs(self) -> int:
-        return sum(epochs for epochs, _ in self.cycles)
-
     def rate(self, epoch: float) -> float:
-        """Return the learning rate after so many epochs: in each cycle a short warm-up, then half a cosine down."""
-        for epochs, peak in self.cycles:
-            if epoch < epochs:
-                break
-            epoch -= epochs
-        done, warm_up = epoch / epochs, 0.03
+        """Return the learning rate after so many epochs: a short warm-up, then half a cosine down to nearly nothing."""
+        done, warm_up = epoch / self.epochs, 0.03
         if done < warm_up:
-            return peak * done / warm_up
-        return peak * (0.5 * (1 + math.cos(math.pi * (done - warm_up) / (1 - warm_up))) + 1e-3)
+            return self.peak_rate * done / warm_up
+        return self.peak_rate * (0.5 * (1 + math.cos(math.pi * (done - warm_up) / (1 - warm_up))) + 1e-3)
 
 
 PLANS = {
-    "eureka": TrainingPlan(cycles=((12, 3e-3), (6, 1.5e-3))),
-    "tiny": TrainingPlan(cycles=((8, 1e-3),), model="tiny"),
+    "eureka": TrainingPlan(epochs=12, peak_rate=3e-3),
+    "tiny": TrainingPlan(epochs=8, peak_rate=1e-3, model="tiny"),
 }
 
 
