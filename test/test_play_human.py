@@ -67,6 +67,8 @@ class Terminal:
         self.process = subprocess.Popen(
             [sys.executable, str(PACKAGE / "scripts" / "play_human"), *arguments],
             stdin=end, stdout=end, stderr=end, env=environment(**variables), start_new_session=True,
+            # Tests run in the background may have been told to ignore it, which a child inherits.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )
         os.close(end)
         self.output = ""
