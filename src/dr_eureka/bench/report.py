@@ -72,7 +72,8 @@ def share_row(
     """Return the share of `hits` in `n` trials with its Wilson 95 % interval (scipy.stats); no value when n is 0."""
     if n == 0:
         return Row(name, None, "share", 0, None, paper, goal, ok)
-    interval = stats.binomtest(int(hits), int(n)).proportion_ci(CONFIDENCE, method="wilson")
+    with np.errstate(divide="ignore"):  # of the p-value, which nobody asked for
+        interval = stats.binomtest(int(hits), int(n)).proportion_ci(CONFIDENCE, method="wilson")
     return Row(name, hits / n, "share", int(n), (float(interval.low), float(interval.high)), paper, goal, ok)
 
 
