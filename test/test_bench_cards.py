@@ -9,13 +9,15 @@ import pytest
 from dr_eureka.bench import cards_plots, cards_speed
 from dr_eureka.bench.cards_breakdown import breakdown, state_rows
 from dr_eureka.bench.cards_map import (
-    HeldOut, detect_held_out, far_rows, held_out_crop, map_rows, match_balls, weighted_precision,
+    HeldOut, detect_held_out, far_rows, held_out_crop, map_rows,
 )
 from dr_eureka.bench.cards_refusals import KINDS, refusal_rows, refusal_scene
 from dr_eureka.bench.cards_samples import draw_samples
 from dr_eureka.bench.cards_states import SERIES, STATES, Trial, run_trials, scene_of
 from dr_eureka.vision.card_detections import CropDetections, SeenBall
-from dr_eureka.vision.card_metrics import average_precision, mean_average_precision
+from dr_eureka.vision.card_metrics import (
+    average_precision, box_overlap, match_balls, mean_average_precision, weighted_precision,
+)
 
 FEW = ("RR|GG|PP", "RRGG||PP", "|RGPP|RG")
 TRIAL = Trial("RR|GG|PP", 0, "OK", "RR|GG|PP", 0.9, 0.25, 0.1, 0.2, 120.0, 1.0, 0.0, 0.5)
@@ -47,12 +49,29 @@ def perfect(truth):
     return [CropDetections(tuple(SeenBall(*b[:3], "RGP"[int(b[3])], 0.9) for b in there), ()) for there in truth]
 
 
+def precision_ball_by_ball(seen, truth, colour):
+    """Return the average precision with one list of all detections, in which each takes its ball in turn."""
+    ranked = sorted(((ball, image) for image, found in enumerate(seen) for ball in found.balls if ball.colour == colour),
+                    key=lambda pair: -pair[0].confidence)
+    wanted = [there[there[:, 3] == "RGP".index(colour)] for there in truth]
+    total, taken, curve = sum(map(len, wanted)), set(), []
+    for rank, (ball, image) in enumerate(ranked, 1):
+        overlaps = [box_overlap((ball.x, ball.y, ball.diameter), box[:3]) for box in wanted[image]]
+        if overlaps and max(overlaps) >= 0.5:
+            taken.add((image, overlaps.index(max(overlaps))))
+        curve.append((len(taken) / total, len(taken) / rank))
+    steps = [recall - before for (recall, _), (before, _) in zip(curve, [(0.0, 1.0), *curve])]
+    return sum(step * max(precision for _, precision in curve[rank:]) for rank, step in enumerate(steps))
+
+
 @pytest.mark.parametrize("colour", "RGP")
-def test_average_precision_is_that_of_the_metrics_when_every_crop_counts_once(truth, colour):
+def test_average_precision_is_that_counted_ball_by_ball_when_every_crop_counts_once(truth, colour):
     for seed in range(5):
         seen = guessed(truth, seed)
-        matches, total = match_balls(truth, seen, colour)
-        expected = average_precision([found.balls for found in seen], truth, colour)
+        balls = [found.balls for found in seen]
+        matches, total = match_balls(truth, balls, colour)
+        expected = precision_ball_by_ball(seen, truth, colour)
+        assert average_precision(balls, truth, colour) == pytest.approx(expected, abs=1e-12)
         assert weighted_precision(matches, total, np.ones(len(truth), int)) == pytest.approx(expected, abs=1e-12)
 
 
@@ -62,7 +81,7 @@ def test_a_crop_that_counts_twice_counts_as_if_it_were_there_twice(truth):
     many, found = [truth[i] for i in chosen], [seen[i] for i in chosen]
     for colour in "RGP":
         expected = average_precision([f.balls for f in found], many, colour)
-        assert weighted_precision(*match_balls(truth, seen, colour), weights) == pytest.approx(expected, abs=0.02)
+        assert weighted_precision(*match_balls(truth, [f.balls for f in seen], colour), weights) == pytest.approx(expected, abs=0.02)
 
 
 def test_mean_average_precision_has_a_row_a_colour_an_interval_and_a_comparison(truth):
@@ -216,7 +235,7 @@ def test_a_training_log_is_read_and_a_broken_one_is_told(tmp_path):
 def test_plots_are_pictures(truth, tmp_path):
     log = {"epoch": np.array([1, 2]), "loss": np.array([1.0, 0.5]), "map50": np.array([0.5, 0.9])}
     cards_plots.plot_training({"eureka": log, "tiny": log}, tmp_path / "training.png")
-    cards_plots.plot_reliability({"eureka": match_balls(truth, guessed(truth, 1), "R")[0]}, tmp_path / "confidence.png")
+    cards_plots.plot_reliability({"eureka": match_balls(truth, [found.balls for found in guessed(truth, 1)], "R")[0]}, tmp_path / "confidence.png")
     cards_plots.plot_breakdown({"any turn": [TRIAL, MISSED], "upside down": [WRONG]}, tmp_path / "states.png")
     draw_samples(SERIES[0], [TRIAL, MISSED], 1, perfect(truth), tmp_path / "samples.png")
     for name in ("training", "confidence", "states", "samples"):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dr_eureka.bench.cards_breakdown import state_rows
 from dr_eureka.bench.cards_map import (
-    CROPS, FAR_CROPS, TITLES, HeldOut, detect_held_out, far_rows, map_rows, match_balls,
+    CROPS, FAR_CROPS, TITLES, HeldOut, detect_held_out, far_rows, map_rows,
 )
 from dr_eureka.bench.cards_refusals import REFUSALS, refusal_rows
 from dr_eureka.bench.cards_speed import network_speed_rows, parameter_rows, reading_speed_rows
@@ -15,6 +15,7 @@ from dr_eureka.bench.cards_states import SERIES, Trial, run_trials
 from dr_eureka.bench.report import BenchOptions, Row
 from dr_eureka.game.state import COLOURS
 from dr_eureka.resources import WEIGHTS_FOLDER, resource_path
+from dr_eureka.vision.card_metrics import match_balls
 from dr_eureka.vision.card_weights import load_detector, log_name
 
 _ROUNDS = 200
@@ -63,7 +64,7 @@ def _draw(out: Path, seed: int, found: HeldOut, tables: Mapping[str, Sequence[Tr
     if logs:
         cards_plots.plot_training(logs, out / "cards_training.png")
     matches = {
-        model: [match for colour in COLOURS for match in match_balls(found.truth, seen, colour)[0]]
+        model: [match for colour in COLOURS for match in match_balls(found.truth, [crop.balls for crop in seen], colour)[0]]
         for model, seen in found.seen.items()
     }
     cards_plots.plot_reliability(matches, out / "cards_confidence.png")

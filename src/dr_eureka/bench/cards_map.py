@@ -8,7 +8,7 @@ on some crops a person does not either: `far` crops are measured beside, without
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from dr_eureka.bench.cards_states import STATES
 from dr_eureka.bench.report import Row, progress
 from dr_eureka.game.state import COLOUR_NAMES, COLOURS
 from dr_eureka.vision.card_detections import CropDetections, collect
-from dr_eureka.vision.card_metrics import box_overlap
+from dr_eureka.vision.card_metrics import match_balls, weighted_precision
 from dr_eureka.vision.card_renderer import draw_card
 from dr_eureka.vision.card_scenes import rectified_sample
 from dr_eureka.vision.card_style import sample_style
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 CROPS, FAR_CROPS = 1000, 300
 LEAST_MAP, MOST_BEHIND = 0.99, 0.005
-OVERLAP = 0.5  # of boxes, from which on a ball counts as found
 TITLES = {"eureka": "YOLO-Dr. Eureka", "tiny": "YOLOv2-tiny"}
 PAPER_MAP = 0.952  # of both networks
 _LEAST_CONFIDENCE = 0.05
@@ -44,15 +43,6 @@ class Crop:
 
     image: np.ndarray
     balls: np.ndarray
-
-
-@dataclass(frozen=True)
-class Match:
-    """A ball as detected: in which crop, how sure, and whether it is one that is there."""
-
-    crop: int
-    confidence: float
-    hit: bool
 
 
 @dataclass(frozen=True)
@@ -93,9 +83,9 @@ def map_rows(found: HeldOut, seed: int) -> list[Row]:
     rows, draws, figures, n = [], {}, {}, len(found.truth)
     weights = np.random.default_rng((seed, _BOOTSTRAP)).multinomial(n, np.full(n, 1 / n), _RESAMPLINGS)
     for model in TITLES:
-        by_colour = []
+        balls, by_colour = [crop.balls for crop in found.seen[model]], []
         for colour in COLOURS:
-            matches, total = match_balls(found.truth, found.seen[model], colour)
+            matches, total = match_balls(found.truth, balls, colour)
             drawn = np.array([weighted_precision(matches, total, w) for w in weights])
             by_colour.append((weighted_precision(matches, total, np.ones(n, int)), drawn))
             rows.append(_map_row(f"AP@0.5 {COLOUR_NAMES[colour]}, {TITLES[model]}", *by_colour[-1], n))
@@ -114,42 +104,6 @@ def far_rows(found: HeldOut, seed: int) -> list[Row]:
         replace(row, name=f"{row.name}, far outside training", paper=None, goal=None, ok=None)
         for row in map_rows(found, seed) if row.name.startswith("mAP")
     ]
-
-
-def match_balls(
-    truth: Sequence[np.ndarray], seen: Sequence[CropDetections], colour: str
-) -> tuple[list[Match], np.ndarray]:
-    """Return the detections of one colour, the surest first, and how many such balls each crop has (n,).
-
-    As in average_precision: each detection takes the ball that it overlaps most, if no surer one has.
-    """
-    matches, total = [], np.zeros(len(truth), int)
-    for index, (balls, found) in enumerate(zip(truth, seen)):
-        wanted = balls[balls[:, 3] == COLOURS.index(colour)]
-        total[index] = len(wanted)
-        taken: set[int] = set()
-        for ball in sorted((b for b in found.balls if b.colour == colour), key=lambda b: -b.confidence):
-            overlaps = [box_overlap((ball.x, ball.y, ball.diameter), box[:3]) for box in wanted]
-            best = int(np.argmax(overlaps)) if overlaps else -1
-            hit = best >= 0 and overlaps[best] >= OVERLAP and best not in taken
-            taken |= {best} if hit else set()
-            matches.append(Match(index, ball.confidence, hit))
-    return sorted(matches, key=lambda match: -match.confidence), total
-
-
-def weighted_precision(matches: Sequence[Match], total: np.ndarray, weights: np.ndarray) -> float:
-    """Return the average precision when each crop counts so many times; with all ones that of the crops as they are.
-
-    matches: the surest first; total, weights: (n,) balls of the colour in each crop, and how often it counts.
-    """
-    if not matches:
-        return 0.0
-    times = weights[[match.crop for match in matches]]
-    hits = np.cumsum(times * [match.hit for match in matches])
-    precision = hits / np.maximum(np.cumsum(times), 1)
-    envelope = np.maximum.accumulate(precision[::-1])[::-1]
-    recall = np.concatenate(([0.0], hits / (total @ weights)))
-    return float(np.sum(np.diff(recall) * envelope))
 
 
 def _map_row(name: str, value: float, drawn: np.ndarray, n: int, paper: float | None = None) -> Row:

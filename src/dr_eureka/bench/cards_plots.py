@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dr_eureka.bench.cards_breakdown import LEAST_RIGHT, breakdown
-from dr_eureka.bench.cards_map import PAPER_MAP, TITLES, Match
+from dr_eureka.bench.cards_map import PAPER_MAP, TITLES
 from dr_eureka.bench.cards_states import Trial
 from dr_eureka.bench.report import share_row
 from dr_eureka.errors import DrEurekaError
+from dr_eureka.vision.card_metrics import Match
 
 _DPI = 110
 _LOG_COLUMNS = ("epoch", "loss", "map50")

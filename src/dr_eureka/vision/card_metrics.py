@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Sequence
 
 import numpy as np
 
 from dr_eureka.game.state import COLOURS
 from dr_eureka.vision.card_detections import SeenBall
+
+
+@dataclass(frozen=True)
+class Match:
+    """A ball as detected: in which crop, how sure, and whether it is one that is there."""
+
+    crop: int
+    confidence: float
+    hit: bool
 
 
 def box_overlap(first: Sequence[float], second: Sequence[float]) -> float:
@@ -21,6 +31,42 @@ def box_overlap(first: Sequence[float], second: Sequence[float]) -> float:
     return shared / (first[2] ** 2 + second[2] ** 2 - shared)
 
 
+def match_balls(
+    truth: Sequence[np.ndarray], seen: Sequence[Sequence[SeenBall]], colour: str, overlap: float = 0.5
+) -> tuple[list[Match], np.ndarray]:
+    """Return the detections of one colour, the surest first, and how many such balls each crop has (n,).
+
+    Each detection takes the ball that it overlaps most, if no surer one has.
+    """
+    matches, total = [], np.zeros(len(truth), int)
+    for index, (balls, found) in enumerate(zip(truth, seen)):
+        wanted = balls[balls[:, 3] == COLOURS.index(colour)]
+        total[index] = len(wanted)
+        taken: set[int] = set()
+        for ball in sorted((b for b in found if b.colour == colour), key=lambda b: -b.confidence):
+            overlaps = [box_overlap((ball.x, ball.y, ball.diameter), box[:3]) for box in wanted]
+            best = int(np.argmax(overlaps)) if overlaps else -1
+            hit = best >= 0 and overlaps[best] >= overlap and best not in taken
+            taken |= {best} if hit else set()
+            matches.append(Match(index, ball.confidence, hit))
+    return sorted(matches, key=lambda match: -match.confidence), total
+
+
+def weighted_precision(matches: Sequence[Match], total: np.ndarray, weights: np.ndarray) -> float:
+    """Return the average precision when each crop counts so many times; with all ones that of the crops as they are.
+
+    matches: the surest first; total, weights: (n,) balls of the colour in each crop, and how often it counts.
+    """
+    if not matches:
+        return 0.0
+    times = weights[[match.crop for match in matches]]
+    hits = np.cumsum(times * [match.hit for match in matches])
+    precision = hits / np.maximum(np.cumsum(times), 1)
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    recall = np.concatenate(([0.0], hits / (total @ weights)))
+    return float(np.sum(np.diff(recall) * envelope))
+
+
 def average_precision(
     seen: Sequence[Sequence[SeenBall]], truth: Sequence[np.ndarray], colour: str, overlap: float = 0.5
 ) -> float:
@@ -29,26 +75,8 @@ def average_precision(
     seen: detections of each image; truth: (n, 4) of each image: x, y, diameter, class index into COLOURS. NaN when the
     colour never occurs.
     """
-    wanted = [t[t[:, 3] == COLOURS.index(colour)] for t in truth]
-    total = sum(len(w) for w in wanted)
-    if total == 0:
-        return float("nan")
-    taken = [np.zeros(len(w), bool) for w in wanted]
-    ranked = sorted(
-        ((ball, image) for image, balls in enumerate(seen) for ball in balls if ball.colour == colour),
-        key=lambda pair: -pair[0].confidence,
-    )
-    hits = np.zeros(len(ranked))
-    for rank, (ball, image) in enumerate(ranked):
-        overlaps = [box_overlap((ball.x, ball.y, ball.diameter), box[:3]) for box in wanted[image]]
-        best = int(np.argmax(overlaps)) if overlaps else -1
-        if best >= 0 and overlaps[best] >= overlap and not taken[image][best]:
-            taken[image][best] = True
-            hits[rank] = 1
-    recall = np.concatenate(([0.0], np.cumsum(hits) / total))
-    precision = np.cumsum(hits) / np.arange(1, len(hits) + 1)
-    envelope = np.maximum.accumulate(precision[::-1])[::-1] if len(precision) else precision
-    return float(np.sum(np.diff(recall) * envelope))
+    matches, total = match_balls(truth, seen, colour, overlap)
+    return weighted_precision(matches, total, np.ones(len(truth), int)) if total.any() else float("nan")
 
 
 def mean_average_precision(
