@@ -1,36 +1,13 @@
 """The short-sighted player against the paper's words and a search written for this test, on bare text."""
 import random
-from collections import deque
 
 import pytest
+from puzzle_text import distances
 
 from dr_eureka.game.human import Habits, human_pours, lifts_settled, settled_balls
 from dr_eureka.game.state import START, Pour, State, all_states
 
 STATES = all_states()
-
-
-def neighbours(text):
-    tubes = text.split("|")
-    for source in range(3):
-        for target in range(3):
-            if source != target and tubes[source] and len(tubes[target]) < 4:
-                after = list(tubes)
-                after[target] += after[source][-1]
-                after[source] = after[source][:-1]
-                yield "|".join(after)
-
-
-def distances(text, allowed=lambda text: True):
-    """Return the number of pours to every state that can be reached through allowed ones."""
-    found, queue = {text: 0}, deque([text])
-    while queue:
-        here = queue.popleft()
-        for after in neighbours(here):
-            if after not in found and allowed(after):
-                found[after] = found[here] + 1
-                queue.append(after)
-    return found
 
 
 def settled(text, goal):

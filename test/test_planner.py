@@ -7,6 +7,7 @@ import time
 from collections import Counter, deque
 
 import pytest
+from puzzle_text import distances, moves
 
 from dr_eureka.game.actions import actions_for, separate_actions
 from dr_eureka.game.planner import plan_pours
@@ -16,30 +17,6 @@ GOALS_AT_DISTANCE = [1, 6, 21, 33, 60, 101, 174, 228, 321, 297, 266, 166, 36]
 MEAN_DISTANCE = 8.01111761263897
 MEAN_HANDLING_SEPARATE = 32.04447045055588
 MEAN_HANDLING_LEFT = 15.441778818022236
-
-
-def moves(text):
-    """Yield (source, target, text after) of every one-ball pour, working on the bare text."""
-    tubes = text.split("|")
-    for source in range(3):
-        for target in range(3):
-            if source != target and tubes[source] and len(tubes[target]) < 4:
-                after = list(tubes)
-                after[target] += after[source][-1]
-                after[source] = after[source][:-1]
-                yield source, target, "|".join(after)
-
-
-def distances(text):
-    """Return the number of pours to every state, by breadth-first search."""
-    found, queue = {text: 0}, deque([text])
-    while queue:
-        here = queue.popleft()
-        for _, _, after in moves(here):
-            if after not in found:
-                found[after] = found[here] + 1
-                queue.append(after)
-    return found
 
 
 def least_handling(start, goal):
