@@ -37,5 +37,6 @@ def _chromaticity(crop: np.ndarray, ball: SeenBall) -> np.ndarray:
     x, y = ball.x * width, ball.y * height
     rows, columns = (slice(max(int(v - reach), 0), max(int(v + reach) + 1, 1)) for v in (y, x))
     patch = crop[rows, columns].reshape(-1, 3)
-    middle = np.median(patch, axis=0) + _DARK_LEVEL
+    half = len(patch) // 2
+    middle = np.partition(patch, half, axis=0)[half] + _DARK_LEVEL  # the median, sooner than numpy's own
     return middle / middle.sum()

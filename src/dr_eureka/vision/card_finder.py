@@ -10,6 +10,7 @@ with the quadrilateral itself, never with pixels at an assumed camera height.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -19,6 +20,7 @@ import numpy as np
 CROP_PX = 416
 NOMINAL_BORDER = 0.065  # white border as a share of the card's side
 _SAMPLES_A_SIDE = 16
+_MOST_POINTS = 320  # of an outline: lines fitted to more are no better
 _SEARCH_HEIGHT_PX = 240
 _OUTLINES_A_PLACE = 2  # of one card at several thresholds, tried in turn when it cannot be read
 _NEXT = [1, 2, 3, 0]
@@ -73,24 +75,33 @@ def _search(smooth: np.ndarray, scale: int, settings: FinderSettings) -> list[Ca
     """Return the candidates, best first, in a grey picture (h, w) uint8 each pixel of which is `scale` wide."""
     white = max(float(np.percentile(smooth[::2, ::2], 99.5)), 16.0)
     smallest = settings.smallest_side * smooth.shape[0]
-    rough = []
+    outlines = []
     for level in np.linspace(0.0, white, settings.threshold_steps + 2)[1:-1]:
         _, dark = cv2.threshold(smooth, level, 255, cv2.THRESH_BINARY_INV)
-        contours, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        for contour in contours:
-            polygon = _four_corners(contour, smallest, settings) if len(contour) >= 3 * smallest else None
-            quality = 0.0 if polygon is None else _quality(smooth, polygon, level, white, settings.least_contrast / 2)
-            if quality > 0.0:
-                rough.append((Candidate(polygon, float(np.sqrt(cv2.contourArea(polygon))), quality), contour, level))
-    rough.sort(key=lambda outline: -outline[0].quality)
+        contours, nesting = cv2.findContours(dark, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        around = nesting[0, :, 3].tolist() if contours else ()
+        for contour, surrounding in zip(contours, around):
+            if surrounding >= 0 or len(contour) < 3 * smallest:  # the rim of a bright hole in something dark, or small
+                continue
+            polygon = _four_corners(contour, smallest, settings)
+            if polygon is not None:
+                outlines.append((polygon, contour, level))
+    if not outlines:
+        return []
+    polygons, _, levels = zip(*outlines)
+    qualities = _qualities(smooth, np.stack(polygons), np.array(levels), white, settings.least_contrast / 2)
     found: list[Candidate] = []
-    for outline, contour, level in rough:
+    for index in np.argsort(-qualities, kind="stable"):
+        polygon, contour, level = outlines[index]
+        outline = Candidate(polygon, float(np.sqrt(cv2.contourArea(polygon))), float(qualities[index]))
+        if outline.quality == 0.0:
+            break
         if sum(_same_place(outline, other, scale) for other in found) == _OUTLINES_A_PLACE:
             continue
         ground = _refine(contour[:, 0, :].astype(np.float32), outline.ground)
         if ground is None or not _filled(contour, ground, settings):
             continue
-        quality = _quality(smooth, ground, level, white, settings.least_contrast)
+        quality = float(_qualities(smooth, ground[None], np.array([level]), white, settings.least_contrast)[0])
         if quality > 0.0:
             ground = (ground + 0.5) * scale - 0.5  # pixel centres of the small picture in the large one
             found.append(Candidate(ground, float(np.sqrt(cv2.contourArea(ground))), quality))
@@ -98,21 +109,27 @@ def _search(smooth: np.ndarray, scale: int, settings: FinderSettings) -> list[Ca
     return found
 
 
-def _quality(smooth: np.ndarray, ground: np.ndarray, level: float, white: float, least_contrast: float) -> float:
-    """Return how well a ground found at a threshold contrasts with its border, 0..1; 0 for less than the least."""
-    border, inside = _border_and_inside(smooth, ground)
-    contrast = float((border - inside).min()) / white
-    if contrast <= least_contrast:
-        return 0.0
+def _qualities(
+    smooth: np.ndarray, grounds: np.ndarray, levels: np.ndarray, white: float, least_contrast: float
+) -> np.ndarray:
+    """Return how well grounds (n, 4, 2), found at threshold levels (n,), contrast with their borders, (n,) of 0..1.
+
+    A ground with less than the least contrast gets 0.
+    """
+    border, inside = _borders_and_insides(smooth, grounds)
+    contrast = (border - inside).min(1) / white
     # An edge that is blurred lies where its threshold is halfway: other levels see a card too small or large.
-    bias = abs(level - (border + inside).mean() / 2) / (border - inside).mean()
-    return min(contrast, 1.0) * max(1.0 - bias, 0.1)
+    apart = np.maximum((border - inside).mean(1), 1e-6)
+    bias = np.abs(levels - (border + inside).mean(1) / 2) / apart
+    return np.where(contrast > least_contrast, np.minimum(contrast, 1.0) * np.maximum(1.0 - bias, 0.1), 0.0)
 
 
 def _same_place(one: Candidate, other: Candidate, scale: int = 1) -> bool:
     """Tell whether two candidates have nearly one place and size; `scale` enlarges the first."""
-    near = np.hypot(*(scale * one.centre - other.centre)) < 0.15 * other.side_px
-    return bool(near) and 0.8 < scale * one.side_px / other.side_px < 1.25
+    if not 0.8 < scale * one.side_px / other.side_px < 1.25:
+        return False
+    x, y = scale * one.centre - other.centre
+    return math.hypot(x, y) < 0.15 * other.side_px
 
 
 def group(candidates: list[Candidate], most: int) -> list[list[Candidate]]:
@@ -155,7 +172,7 @@ def coloured_share(crop: np.ndarray) -> float:
 
 def _four_corners(contour: np.ndarray, smallest: float, settings: FinderSettings) -> np.ndarray | None:
     """Return the rough corners (4, 2) float32, clockwise in the picture, of a contour that is nearly a quadrilateral."""
-    hull = cv2.convexHull(contour)
+    hull = cv2.convexHull(np.ascontiguousarray(contour[:: 1 + len(contour) // _MOST_POINTS]))
     if cv2.contourArea(hull) < smallest**2:
         return None
     perimeter = cv2.arcLength(hull, True)
@@ -184,6 +201,7 @@ def _refine(contour: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
     """Move a polygon's corners to where lines through the middles of its sides meet: the card's corners are round."""
     lines = []
     middle = polygon.mean(0)
+    contour = contour[:: 1 + len(contour) // _MOST_POINTS]
     for start, end in zip(polygon, polygon[_NEXT]):
         length = np.linalg.norm(end - start)
         if length < 4:
@@ -195,7 +213,6 @@ def _refine(contour: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
         near = contour[(share > 0.12) & (share < 0.88) & (np.abs(offset @ normal) < 0.05 * length + 1)]
         if len(near) < 8:
             return None
-        near = near[:: 1 + len(near) // 64]
         vx, vy, x, y = cv2.fitLine(near, cv2.DIST_HUBER, 0, 0.01, 0.01).ravel()
         point = np.array((x, y))
         outward = np.array((-vy, vx))
@@ -211,14 +228,15 @@ def _refine(contour: np.ndarray, polygon: np.ndarray) -> np.ndarray | None:
     return np.array(corners, np.float32)
 
 
-def _border_and_inside(whiteness: np.ndarray, ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the level of the white border and that just inside the ground, for each of the four sides."""
-    middle = ground.mean(0)
-    corners = middle + _SAMPLED_SCALES * (ground - middle)
-    along = corners[:, _NEXT] - corners
-    x, y = (corners[:, :, None] + _SIDE_SHARES * along[:, :, None]).reshape(-1, _SAMPLES_A_SIDE, 2).transpose(2, 0, 1)
-    levels = cv2.remap(whiteness, np.ascontiguousarray(x), np.ascontiguousarray(y), cv2.INTER_LINEAR,
+def _borders_and_insides(whiteness: np.ndarray, grounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the levels of the white borders and those just inside the grounds (n, 4, 2), for each side: (n, 4) each."""
+    middle = grounds.mean(1)[:, None, None]
+    corners = middle + _SAMPLED_SCALES * (grounds[:, None] - middle)
+    along = corners[:, :, _NEXT] - corners
+    points = (corners[:, :, :, None] + _SIDE_SHARES * along[:, :, :, None]).reshape(-1, _SAMPLES_A_SIDE, 2)
+    levels = cv2.remap(whiteness, np.ascontiguousarray(points), None, cv2.INTER_LINEAR,
                        borderMode=cv2.BORDER_CONSTANT, borderValue=0)
     levels.sort(axis=1)
+    levels = levels.reshape(len(grounds), 2, 4, _SAMPLES_A_SIDE).astype(float)
     # A quarter of the border may be hidden; inside, three white feet may leave little of a side dark.
-    return levels[:4, _SAMPLES_A_SIDE // 4].astype(float), levels[4:, _SAMPLES_A_SIDE // 7].astype(float)
+    return levels[:, 0, :, _SAMPLES_A_SIDE // 4], levels[:, 1, :, _SAMPLES_A_SIDE // 7]

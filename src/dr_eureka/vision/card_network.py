@@ -7,11 +7,13 @@ from typing import Mapping
 
 import numpy as np
 import torch
+from torch import nn
 
 from dr_eureka.memory import keep_freed_memory
 from dr_eureka.vision.card_architecture import FIRST_FOOT, GRID, from_arrays
 
 _BALL_SIZE = 0.125  # diameter a zero output stands for, as a fraction of the crop
+_CELLS = torch.stack(torch.meshgrid(torch.arange(GRID), torch.arange(GRID), indexing="xy"), -1)  # column, row of each
 _CELL_STRETCH = 1.4  # a cell reaches 0.2 of a cell into its neighbours, so no centre lies where none is sure
 
 
@@ -42,7 +44,7 @@ def log_size(diameter: np.ndarray) -> np.ndarray:
 def decode(raw: torch.Tensor) -> GridDetections:
     """Decode raw grids (N, 10, 13, 13) into centres, confidences and classes."""
     raw = raw.permute(0, 2, 3, 1)
-    cells = torch.stack(torch.meshgrid(torch.arange(GRID), torch.arange(GRID), indexing="xy"), -1).to(raw)
+    cells = _CELLS.to(raw)
     scores = torch.softmax(raw[..., 4:FIRST_FOOT], -1)
     ball_centres = (cells + centre_offsets(raw[..., 1:3])) / GRID
     foot_centres = (cells + centre_offsets(raw[..., FIRST_FOOT + 1:])) / GRID
@@ -55,6 +57,17 @@ def decode(raw: torch.Tensor) -> GridDetections:
     )
 
 
+class _PairedMaximum(nn.Module):
+    """What MaxPool2d(2) does to maps of even size kept channels last, at a third of its time where channels are few."""
+
+    def forward(self, maps: torch.Tensor) -> torch.Tensor:
+        """Return the maxima (n, c, h / 2, w / 2) of squares of maps (n, c, h, w)."""
+        count, channels, height, width = maps.shape
+        rows = maps.permute(0, 2, 3, 1).reshape(count, height // 2, 2, width * channels)
+        pairs = torch.maximum(rows[:, :, 0], rows[:, :, 1]).view(count, height // 2, width // 2, 2, channels)
+        return torch.maximum(pairs[..., 0, :], pairs[..., 1, :]).permute(0, 3, 1, 2)
+
+
 class CardNetwork:
     """A trained detector for use: RGB crops in, decoded grids out."""
 
@@ -65,6 +78,10 @@ class CardNetwork:
         network = from_arrays(arrays, model)
         with torch.no_grad():
             network.features[0][0].weight.div_(255.0)  # here once instead of for each pixel
+        for block in network.features:
+            for index, layer in enumerate(block):
+                if isinstance(layer, nn.MaxPool2d) and layer.stride == 2:
+                    block[index] = _PairedMaximum()
         self._network = network.to(memory_format=torch.channels_last)
 
     def detect(self, crop_rgb: np.ndarray) -> GridDetections:
