@@ -54,7 +54,7 @@ class TrainingPlan:
 
 
 PLANS = {
-    "eureka": TrainingPlan(epochs=12, peak_rate=3e-3),
+    "eureka": TrainingPlan(epochs=20, peak_rate=3e-3),
     "tiny": TrainingPlan(epochs=8, peak_rate=1e-3, model="tiny"),
 }
 
