@@ -99,6 +99,17 @@ def test_the_board_is_one_page_and_opencv_finds_its_corners_at_true_scale(tmp_pa
     assert np.sum(255 - page[: -15 * PX_PER_MM].astype(float)) / 255 / PX_PER_MM**2 == pytest.approx(black, rel=0.002)
 
 
+def test_the_markers_of_both_hands_have_their_size_and_white_round_them(tmp_path):
+    (page,) = printed_pages(tmp_path, "hands")
+    found = {marker: (quad + 0.5) / PX_PER_MM for marker, quad in detect_markers(page, PIECES.marker_dictionary).items()}
+    assert sorted(found) == sorted(PIECES.hand_markers.values())
+    side, apart = PIECES.hand_marker_side * 1000, (PIECES.hand_marker_side + 2 * PIECES.hand_marker_margin) * 1000
+    square = np.array([(0, 0), (side, 0), (side, side), (0, side)])
+    left, right = (found[PIECES.hand_markers[hand]] for hand in ("left", "right"))
+    assert np.abs(left - left[0] - square).max() < 0.1 and np.abs(right - right[0] - square).max() < 0.1
+    assert right[0] - left[0] == pytest.approx([apart, 0.0], abs=0.1)
+
+
 def test_four_cards_of_100_mm_fill_a_page_of_a4(tmp_path):
     pages = printed_pages(tmp_path, "cards", "--states", "RRGG||PP", "RR|GG|PP", "GP|RPGR|", "P|RG|GPR", "RG|PG|RP")
     assert len(pages) == 2
@@ -121,7 +132,7 @@ def test_equal_arguments_write_an_equal_file_and_another_seed_another(tmp_path):
 
 def test_everything_is_printed_unless_told_otherwise(tmp_path, capsys):
     assert main(["--cards", "1", "--out", str(tmp_path / "all.pdf")]) == 0
-    assert "all.pdf: 5 pages A4" in capsys.readouterr().out
+    assert "all.pdf: 6 pages A4" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -30,11 +30,11 @@ def clock(monkeypatch):
     return now
 
 
-def make(clock, info=True, joints=True, backlog=1, pose_limit=0.0):
+def make(clock, info=True, joints=True, backlog=1, pose_limit=0.0, camera=None):
     settings = sight.SightSettings(
         image_max_age=2.0, pose_limit=pose_limit, still_window=0.25, still_tolerance=0.003, backlog=backlog, history=5.0
     )
-    eye = sight.Sight(settings, "raw")
+    eye = sight.Sight(settings, "raw", camera)
     if info:
         eye.hear_info(info_from_camera(CameraModel.lab(), rospy.Time(1), "cam_link"))
     if joints:
@@ -65,6 +65,14 @@ def test_an_image_comes_with_calibration_and_the_cameras_pose_at_its_stamp(clock
     np.testing.assert_array_equal(frame.image, RGB)
     np.testing.assert_allclose(frame.base_from_camera, base_from_camera(HEAD), atol=1e-9)
     assert eye.take() is None
+
+
+@pytest.mark.parametrize("info", [True, False])
+def test_a_calibration_of_ones_own_counts_instead_of_the_cameras(clock, info):
+    own = CameraModel.lab(distorted=True)
+    eye = make(clock, info=info, camera=own)
+    eye.hear_image(image(10.0))
+    assert eye.take().camera is own
 
 
 def test_before_the_first_image_the_topic_is_named(clock):

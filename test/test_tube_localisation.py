@@ -201,6 +201,16 @@ def test_a_fallen_tube_is_never_taken_for_a_standing_one(pieces, settings, turn)
     assert found.result in (TubeResult.TUBE_FALLEN, TubeResult.TUBE_HIDDEN)  # hidden if another tube is in front of it
 
 
+@pytest.mark.parametrize(
+    "yaw, beside", [(0.0, (-0.037, 0.19)), (0.34, (-0.037, -0.156)), (0.34, (-0.10, 0.122)), (-0.36, (0.105, -0.122))]
+)
+def test_a_foot_that_touches_a_marker_is_measured_by_what_is_seen_of_it(pieces, settings, yaw, beside):
+    scene = Scene(sheet=(0.477, -0.008, yaw), tubes=np.array([[0.04, 0.10], [0.04, 0.0], beside]), noise=4.0)
+    found = look(scene, pieces, settings)
+    assert found.result == TubeResult.OK
+    assert errors_mm(found, scene).max() < 0.6
+
+
 def test_a_head_that_nods_by_half_a_degree_is_corrected_from_the_sheets_perspective(pieces, settings):
     scene = Scene(sheet=(0.475, 0.0, 0.05))
     nodding = replace(scene, head_pitch=scene.head_pitch + np.radians(0.5)).base_from_camera

@@ -14,6 +14,7 @@ from dr_eureka.simulation.bodies import GRAVITY, BodyMaker, set_up_physics
 from dr_eureka.simulation.placement import draw_placement
 from dr_eureka.simulation.quiet import quiet_stdout
 from dr_eureka.simulation.settings import SimulationError, load_world_settings
+from dr_eureka.simulation.stage import Stage
 from dr_eureka.simulation.tube_model import mass_properties
 from dr_eureka.simulation.world import World
 
@@ -144,19 +145,30 @@ def test_placements_stay_within_their_scatter_and_differ_by_seed():
     assert len({tuple(placement.tubes["left"]) for placement in placements}) == 100
 
 
-def test_equal_seeds_and_commands_give_equal_worlds():
-    def play(seed):
-        world = World(SETTINGS, seed)
-        for cycle in range(60):
-            world.set_joint_goals({"l_arm_sh_p1": 0.5689 - 0.004 * cycle, "head_p": 0.01 * cycle, "r_arm_grip": 1.0})
-            world.advance_cycle()
-        state = [*world.joint_positions().values()] + [x for _, centre in world.ball_positions() for x in centre]
-        state += [x for name in TUBES for x in world.tube_pose(name).ravel()]
-        world.close()
-        return state
+def moved_world(seed, stage=None):
+    """Return the numbers of a world after some motion."""
+    world = World(SETTINGS, seed, stage=stage)
+    for cycle in range(60):
+        world.set_joint_goals({"l_arm_sh_p1": 0.5689 - 0.004 * cycle, "head_p": 0.01 * cycle, "r_arm_grip": 1.0})
+        world.advance_cycle()
+    state = [*world.joint_positions().values()] + [x for _, centre in world.ball_positions() for x in centre]
+    state += [x for name in TUBES for x in world.tube_pose(name).ravel()]
+    world.close()
+    return state
 
-    assert play(5) == play(5)
-    assert play(5) != play(6)
+
+def test_equal_seeds_and_commands_give_equal_worlds():
+    assert moved_world(5) == moved_world(5)
+    assert moved_world(5) != moved_world(6)
+
+
+@pytest.mark.parametrize("most_worlds", [64, 1])
+def test_a_stage_carries_nothing_from_one_world_to_the_next(monkeypatch, most_worlds):
+    monkeypatch.setattr("dr_eureka.simulation.stage.MOST_WORLDS", most_worlds)
+    stage = Stage(None)
+    assert [moved_world(seed, stage) for seed in (6, 5)] == [moved_world(seed) for seed in (6, 5)]
+    stage.close()
+    stage.close()
 
 
 def test_a_layout_without_all_tubes_and_a_start_with_unknown_joints_are_refused():

@@ -49,10 +49,11 @@ def play_actions(
     method: str,
     limit: float = 600.0,
     each_cycle: Callable[[float], None] | None = None,
+    hands_at_once: bool = False,
 ) -> EngineStatus:
     """Run a strategy in a world and return how it ended."""
     port = WorldPort(world)
     time_s, joints = port.read()
     engine.tick(time_s, joints)
-    engine.start(actions, places, balls, method)
+    engine.start(actions, places, balls, method, hands_at_once=hands_at_once)
     return run_until_idle(port, engine, limit, each_cycle)

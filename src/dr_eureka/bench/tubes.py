@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
 from collections import Counter
@@ -16,6 +17,8 @@ from dr_eureka.bench.calibration import photograph_rows
 from dr_eureka.bench.hand_eye import run_rows
 from dr_eureka.bench.report import BenchOptions, Row, mean_row, progress, share_row
 from dr_eureka.bench.tubes_scenes import SERIES, Eyes, Series, Trial, judge, take_shot
+from dr_eureka.simulation.settings import load_camera_settings
+from dr_eureka.simulation.stage import Stage
 from dr_eureka.vision.tubes import TubeResult
 
 SCENES = 500
@@ -40,7 +43,11 @@ def run(options: BenchOptions) -> list[Row]:
     if options.out is not None:
         from dr_eureka.bench.tubes_plots import draw_plots
 
-        draw_plots(options.out, options.seed, tables)
+        stage = Stage(load_camera_settings().renderer)
+        try:
+            draw_plots(options.out, stage, options.seed, tables)
+        finally:
+            stage.close()
     return rows
 
 
@@ -81,8 +88,8 @@ def place_rows(name: str, trials: Sequence[Trial]) -> list[Row]:
             Row(f"{name}: error, largest", float(errors.max()), "mm", len(errors)),
             mean_row(f"{name}: stated standard deviation", sigmas.reshape(-1, 3).mean(axis=1), "mm"),
         ]
-    times = [trial.locate_ms for trial in trials]
-    rows.append(Row(f"{name}: time to locate, median", float(np.median(times)), "ms", len(trials)))
+    rows.append(_time_row(f"{name}: processor time to locate", [trial.locate_ms for trial in trials]))
+    rows.append(_time_row(f"{name}: processor time of a frame", [trial.locate_ms + trial.read_ms for trial in trials]))
     return rows
 
 
@@ -104,22 +111,26 @@ def contents_rows(name: str, trials: Sequence[Trial], judged: bool = True) -> li
     ]
     refused = Counter(trial.contents for trial in trials if trial.contents and trial.read is None)
     rows += [share_row(f"{name}: contents {result}", number, count) for result, number in sorted(refused.items())]
-    times = [trial.read_ms for trial in trials if trial.contents]
-    if times:
-        rows.append(Row(f"{name}: time to read, median", float(np.median(times)), "ms", len(times)))
     return rows
 
 
+def _time_row(name: str, times_ms: Sequence[float]) -> Row:
+    return Row(f"{name}, median", float(np.median(times_ms)), "ms", len(times_ms))
+
+
 _eyes: Eyes | None = None
+_stage: Stage | None = None
 
 
 def _prepare() -> None:
-    """Load this process's settings, once; each process keeps to one core."""
-    global _eyes
+    """Load this process's settings and open its renderer, once; each process keeps to one core."""
+    global _eyes, _stage
     cv2.setNumThreads(1)
     if _eyes is None:
-        _eyes = Eyes.load()
+        _eyes, _stage = Eyes.load(), Stage(load_camera_settings().renderer)
+        # Left to the interpreter's end, Bullet would write to standard output.
+        atexit.register(_stage.close)
 
 
 def _trial(series: Series, seed: int, index: int) -> Trial:
-    return judge(_eyes, take_shot(series, seed, index), index)
+    return judge(_eyes, take_shot(_stage, series, seed, index), index)

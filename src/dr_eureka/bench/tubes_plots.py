@@ -14,6 +14,7 @@ from matplotlib.patches import Circle
 
 from dr_eureka.bench.tubes_scenes import SERIES, Eyes, Shot, Trial, take_shot
 from dr_eureka.game.state import TUBES
+from dr_eureka.simulation.stage import Stage
 from dr_eureka.vision.contents import TubeView, read_contents, upright
 from dr_eureka.vision.rectified import SheetGrid, paper_brightness, rectify
 from dr_eureka.vision.tubes import TubeResult, TubeScene, locate_tubes
@@ -23,11 +24,11 @@ _SAMPLES = 6
 _BINS_MM = np.linspace(0.0, 1.5, 61)
 
 
-def draw_plots(folder: Path, seed: int, tables: Mapping[str, Sequence[Trial]]) -> None:
-    """Write all plots as PNG into a folder that exists."""
+def draw_plots(folder: Path, stage: Stage, seed: int, tables: Mapping[str, Sequence[Trial]]) -> None:
+    """Write all plots as PNG into a folder that exists; scenes are drawn on a stage with a renderer."""
     plot_errors(tables, folder / "tubes_errors.png")
     eyes = Eyes.load()
-    shots = [take_shot(series, seed, index) for index, series in zip(range(_SAMPLES), SERIES * _SAMPLES)]
+    shots = [take_shot(stage, series, seed, index) for index, series in zip(range(_SAMPLES), SERIES * _SAMPLES)]
     scenes = [locate_tubes(shot.image, shot.camera, shot.base_from_camera, eyes.pieces, eyes.tubes) for shot in shots]
     plot_steps(eyes, shots[0], scenes[0], folder / "tubes_steps.png")
     plot_contents(eyes, shots, scenes, folder / "tubes_contents.png")

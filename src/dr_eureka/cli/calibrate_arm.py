@@ -19,6 +19,7 @@ from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.hands import HANDS
 from dr_eureka.pieces import load_pieces
 from dr_eureka.resources import load_yaml
+from dr_eureka.vision.camera import CameraModel, load_camera
 from dr_eureka.vision.tubes import TubeSettings
 
 _CONTROL = "config/control_engine.yaml"
@@ -33,17 +34,21 @@ class RunningRobot(CalibrationRobot, Protocol):
         """Let go of the robot."""
 
 
-def main(argv: Optional[Sequence[str]] = None, *, connect: Callable[[str, float], RunningRobot]) -> int:
+def main(
+    argv: Optional[Sequence[str]] = None, *, connect: Callable[[str, Optional[CameraModel], float], RunningRobot]
+) -> int:
     """Run the command with its arguments (default: the process's) and return its exit code, 1 when nothing was calibrated.
 
-    `connect(camera, settle_seconds)` gives the running robot; it comes from the caller because only nodes touch ROS.
+    `connect(camera, calibration, settle_seconds)` gives the running robot; it comes from the caller because only nodes touch
+    ROS.
     """
     arguments = _parser().parse_args(argv)
     robot = None
     try:
         settings = ArmCalibrationSettings.load()
         control = ControlSettings.from_mapping(load_yaml(_CONTROL), _CONTROL)
-        robot = connect(arguments.camera, settings.settle_seconds)
+        calibration = load_camera(arguments.calibration) if arguments.calibration else None
+        robot = connect(arguments.camera, calibration, settings.settle_seconds)
         folder = arguments.out or robot.calibration_folder
         if folder is None:
             problem = "the control engine looks for no calibration; give its launch file arm_calibration:= or me --out"
@@ -91,5 +96,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--camera", metavar="NAMESPACE", default="camera", help="of the camera's topics (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--calibration", metavar="FILE", help="as calibrate_camera wrote it (default: the camera's own camera_info)"
     )
     return parser

@@ -1,4 +1,4 @@
-"""The command `print_game`: sheet, calibration board and cards as a PDF at true scale."""
+"""The command `print_game`: sheet, calibration board, markers of the hands and cards as a PDF at true scale."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from dr_eureka.bench.report import progress
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.state import State, all_states
 from dr_eureka.pieces import load_pieces
-from dr_eureka.printing.artwork import board_artwork, card_artworks, sheet_artwork
+from dr_eureka.printing.artwork import board_artwork, card_artworks, hands_artwork, sheet_artwork
 from dr_eureka.printing.pages import PAPERS, Artwork, write_pdf
 from dr_eureka.vision.calibration_views import CalibrationSettings
 
-ITEMS = ("sheet", "board", "cards")
+ITEMS = ("sheet", "board", "hands", "cards")
 CARDS_IN_A_BOX = 54
 
 
@@ -42,6 +42,8 @@ def _artworks(item: str, arguments: argparse.Namespace) -> list[Artwork]:
         return [sheet_artwork(pieces)]
     if item == "board":
         return [board_artwork(CalibrationSettings.load().board)]
+    if item == "hands":
+        return [hands_artwork(pieces)]
     if arguments.states:
         states = [str(State.parse(text)) for text in arguments.states]
     else:
@@ -75,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="print_game",
         description="Write the game's paper as a PDF at true scale: the sheet for the tubes, the ChArUco board for "
-        "calibrate_camera, and cards.",
+        "calibrate_camera, the markers of the hands for calibrate_arm, and cards.",
         epilog="What is larger than the paper is cut into parts with marks to cut along; the sheet fits A2 whole. Each page "
         "has a bar of 100 mm to measure it by. Sizes come from config/pieces.yaml and config/calibrate_camera.yaml.",
     )

@@ -15,6 +15,7 @@ from dr_eureka.errors import DrEurekaError
 from dr_eureka.nodes.engine_client import EngineClient
 from dr_eureka.nodes.sight import Sight, SightSettings
 from dr_eureka.resources import load_yaml
+from dr_eureka.vision.camera import CameraModel
 
 _SERVICE_LIMIT_S = 10.0
 _MOVE_LIMIT_S = 60.0
@@ -34,10 +35,11 @@ class RobotError(DrEurekaError):
 class RosCalibrationRobot:
     """A `behaviour.arm_calibration.CalibrationRobot` on the topics of a robotis manager, real or simulated."""
 
-    def __init__(self, camera: str, settle_seconds: float):
+    def __init__(self, camera: str, calibration: Optional[CameraModel], settle_seconds: float):
         """Connect to the running robot; raises RobotError when there is no ROS master.
 
-        `camera` is the namespace of the camera's topics, `settle_seconds` how long the robot rests after each motion.
+        `camera` is the namespace of the camera's topics, `calibration` counts instead of its camera_info where there is
+        one, `settle_seconds` is how long the robot rests after each motion.
         """
         if not rosgraph.is_master_online():
             raise RobotError(f"no ROS master at {rosgraph.get_master_uri()}; start the robot by calibrate_arm.launch first")
@@ -47,7 +49,7 @@ class RosCalibrationRobot:
         self._joints: dict[str, float] = {}
         self._engine = EngineClient(_SERVICE_LIMIT_S)
         sight = load_yaml(_SIGHT)["node"]
-        self._sight = Sight(SightSettings(backlog=1, **{key: sight[key] for key in _SIGHT_KEYS}), "raw")
+        self._sight = Sight(SightSettings(backlog=1, **{key: sight[key] for key in _SIGHT_KEYS}), "raw", calibration)
         rospy.Subscriber("robotis/present_joint_states", JointState, self._on_joints, queue_size=1, tcp_nodelay=True)
         self._sight.open(True)
 

@@ -15,7 +15,7 @@ from dr_eureka.bags.images import ImageError, camera_from_info, rgb_from_compres
 from dr_eureka.behaviour.head_history import HeadHistory
 from dr_eureka.behaviour.observation import Frame, Gaze, ImageHeader
 from dr_eureka.kinematics.arms import head_chain
-from dr_eureka.vision.camera import CameraError
+from dr_eureka.vision.camera import CameraError, CameraModel
 from dr_eureka.vision.voting import RepeatedPictures
 
 TRANSPORTS = ("raw", "compressed")
@@ -44,17 +44,19 @@ class SightSettings:
 class Sight:
     """The images of `camera/image_raw`, each with calibration and pose.
 
-    An image is usable when it decodes, is newer than the last and not the same picture, fits the calibration of
-    `camera/camera_info`, and when `robotis/present_joint_states` tell where the head was at its stamp and that it was at
-    rest. Otherwise `problem` says what is wrong in one line; `frozen` tells that images come, but nothing new in them.
+    An image is usable when it decodes, is newer than the last and not the same picture, fits the calibration, which is
+    that of `camera/camera_info` unless a `camera` is given, and when `robotis/present_joint_states` tell where the head was
+    at its stamp and that it was at rest. Otherwise `problem` says what is wrong in one line; `frozen` tells that images
+    come, but nothing new in them.
     """
 
-    def __init__(self, settings: SightSettings, transport: str):
+    def __init__(self, settings: SightSettings, transport: str, camera: Optional[CameraModel] = None):
         self._settings = settings
         self._chain = head_chain()
         self._history = HeadHistory(tuple(self._chain.joint_names), settings.history)
         self._lock = threading.Lock()
         self._pending: deque[tuple[float, float, Image | CompressedImage]] = deque(maxlen=settings.backlog)
+        self._camera = camera
         self._info: Optional[CameraInfo] = None
         self._last_stamp_s = 0.0
         self._repeated = RepeatedPictures()
@@ -95,11 +97,11 @@ class Sight:
             if joints is None and self._waits_for_joints(stamp_s, arrived_s):
                 return None
             self._pending.popleft()
-        if info is None:
+        if self._camera is None and info is None:
             self._drop(f"no calibration on {rospy.resolve_name('camera/camera_info')}")
             return None
         try:
-            camera = camera_from_info(info)
+            camera = self._camera or camera_from_info(info)
             image = rgb_from_compressed(message) if self._compressed else rgb_from_image(message)
             camera.check_size(image)
         except (ImageError, CameraError) as error:

@@ -1,4 +1,4 @@
-"""What is printed: the sheet that the tubes stand on, the board that calibrates the camera, and cards."""
+"""What is printed: the sheet that the tubes stand on, what calibrates camera and arms, and cards."""
 
 from __future__ import annotations
 
@@ -49,6 +49,29 @@ def board_artwork(board: CharucoBoard) -> Artwork:
     squares, markers = (f"{side * 1000:g} mm" for side in (board.square_side, board.marker_side))
     title = f"ChArUco board, {board.columns} x {board.rows} squares of {squares}, markers {markers} {board.dictionary}"
     return Artwork(title, width, height, lambda canvas: _fill(canvas, board.black_rectangles()))
+
+
+def hands_artwork(pieces: Pieces) -> Artwork:
+    """Return the markers of both hands beside one another, from the left hand's on, each with a line to cut along.
+
+    Their top edges, toward the fingers when glued on, are up.
+    """
+    side, margin = pieces.hand_marker_side, pieces.hand_marker_margin
+    label = side + 2 * margin
+    black = []
+    for index, marker in enumerate(pieces.hand_markers.values()):
+        black.append(module_rectangles(marker, side, pieces.marker_dictionary) + (index * label + margin, margin, 0.0, 0.0))
+
+    def draw(canvas: Canvas) -> None:
+        _fill(canvas, np.vstack(black))
+        canvas.setStrokeGray(OUTLINE / 255)
+        canvas.setLineWidth(_CUT_LINE_M * POINTS_PER_M)
+        for index in range(len(black)):
+            canvas.rect(*(length * POINTS_PER_M for length in (index * label, -label, label, label)), stroke=1, fill=0)
+
+    hands = ", ".join(f"{hand} {marker}" for hand, marker in pieces.hand_markers.items())
+    title = f"Markers of the hands, {side * 1000:g} mm {pieces.marker_dictionary}: {hands}; top edge toward the fingers"
+    return Artwork(title, len(black) * label, label, draw)
 
 
 def card_artworks(states: Sequence[str], seed: int, side: float, paper: str) -> Iterator[Artwork]:

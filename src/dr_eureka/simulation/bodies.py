@@ -56,8 +56,9 @@ class BodyMaker:
         self._pieces = pieces
         self._friction = friction
         self._restitution = restitution
-        self._wall_tint = wall_tint
         self._tube_com, _ = mass_properties(pieces, physics.tube_mass)
+        self._tube_file = scratch_folder() / "tube.urdf"
+        write_tube_urdf(self._tube_file, pieces, physics.tube_mass, physics.wall_boxes, wall_tint)
 
     def scenery(self, centre: Sequence[float], size: Sequence[float], colour: Sequence[float]) -> int:
         """Add a box [m] that is only seen, never touched."""
@@ -73,9 +74,7 @@ class BodyMaker:
 
     def tube(self, foot: Sequence[float], orientation: Sequence[float] = UPRIGHT, fixed: bool = False) -> int:
         """Add a tube with the underside of its foot at `foot` [m], `orientation` x y z w; a fixed one never moves."""
-        path = scratch_folder() / "tube.urdf"
-        write_tube_urdf(path, self._pieces, self._physics.tube_mass, self._physics.wall_boxes, self._wall_tint)
-        tube = self._client.loadURDF(str(path), foot, orientation, useFixedBase=fixed,
+        tube = self._client.loadURDF(str(self._tube_file), foot, orientation, useFixedBase=fixed,
                                      flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
         found = len(self._client.getCollisionShapeData(tube, -1))
         expected = collision_shape_count(self._physics.wall_boxes)

@@ -1,8 +1,8 @@
 """The head camera: what the robot sees, rendered along +z of cam_link by Bullet's renderers."""
 from __future__ import annotations
 
+import hashlib
 import importlib.util
-import itertools
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -31,7 +31,6 @@ LAMP_DISTANCE = 10.0
 EXPOSURE = 0.85
 NOISE_MARGIN = 32
 HAND_MARKER_PX_PER_M = 4000
-_picture_numbers = itertools.count()
 _PROBE = """
 import importlib.util, pybullet
 pybullet.connect(pybullet.DIRECT)
@@ -145,7 +144,8 @@ class HeadCamera:
     def _add_hand_marker(self, marker: int) -> int:
         """Add a body that shows a marker at its place in the frame of a hand's end link."""
         pieces = self._pieces
-        side, margin = (round(length * HAND_MARKER_PX_PER_M) for length in (pieces.hand_marker_side, pieces.hand_marker_margin))
+        lengths = (pieces.hand_marker_side, pieces.hand_marker_margin)
+        side, margin = (round(length * HAND_MARKER_PX_PER_M) for length in lengths)
         picture = np.pad(marker_image(marker, side, pieces.marker_dictionary), margin, constant_values=255)
         centre = np.array(pieces.hand_marker_centre)
         outward = (pieces.hand_marker_corners() - centre) * (1.0 + 2.0 * pieces.hand_marker_margin / pieces.hand_marker_side)
@@ -160,8 +160,9 @@ class HeadCamera:
         """Add a flat body with a picture on it; only seen, never touched."""
         if picture.dtype != np.uint8 or picture.ndim not in (2, 3):
             raise SimulationError(f"{name} picture: is {picture.dtype} {picture.shape}; expected uint8 rows x columns (x 3)")
-        # PyBullet remembers files by name: a new picture needs a new one.
-        mesh = self._folder / f"{name}_{next(_picture_numbers)}.obj"
+        # PyBullet remembers files by name for as long as the process lives: equal pictures share one, others need another.
+        digest = hashlib.sha256(repr((picture.shape, corners)).encode() + picture.tobytes()).hexdigest()
+        mesh = self._folder / f"{name}_{digest[:16]}.obj"
         image = mesh.with_suffix(".png")
         cv2.imwrite(str(image), picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
         write_picture_plane(mesh, corners, image.name)

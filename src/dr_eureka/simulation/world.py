@@ -1,22 +1,22 @@
 """The simulated world: robot, table, sheet, tubes and balls as rigid bodies that move by contact alone."""
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Mapping
 
 import numpy as np
 import pybullet
-from pybullet_utils.bullet_client import BulletClient
 
 from dr_eureka.game.state import START, TUBES, State
 from dr_eureka.pieces import Pieces, load_pieces
 from dr_eureka.simulation.arm_errors import draw_arm_errors
 from dr_eureka.simulation.bodies import BodyMaker, scratch_folder, set_up_physics
 from dr_eureka.simulation.placement import draw_placement
-from dr_eureka.simulation.quiet import quiet_stdout
 from dr_eureka.simulation.referee import Verdict, judge
-from dr_eureka.simulation.rendering import HeadCamera, SceneTextures, open_renderer
+from dr_eureka.simulation.rendering import HeadCamera, SceneTextures
 from dr_eureka.simulation.robot import SimulatedRobot
 from dr_eureka.simulation.settings import CameraSettings, SimulationError, WorldSettings
+from dr_eureka.simulation.stage import Stage
 
 # Before time 0 the balls fall the last half millimetre into place; a stack is at rest below this speed.
 SETTLE_SECONDS = 2.0
@@ -27,6 +27,15 @@ BOARD_COLOUR = (0.66, 0.60, 0.52, 1.0)
 # What is seen beyond the table: centre and size [m], colour. Only seen, never touched.
 ROOM = (((1.0, 0.0, -0.01), (6.0, 6.0, 0.02), (0.45, 0.46, 0.48, 1.0)),
         ((2.6, 0.0, 1.4), (0.02, 6.0, 2.8), (0.78, 0.77, 0.72, 1.0)))
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A moment of one world: Bullet's number for it, the servos' goals, the control cycles until then."""
+
+    bullet_state: int
+    servos: tuple[np.ndarray, np.ndarray, np.ndarray]
+    cycles: int
 
 
 class World:
@@ -42,18 +51,20 @@ class World:
         textures: pictures of the sheet and of a card, if any is to be seen.
         pieces: sizes of the game's pieces; the package's by default.
         camera: the head camera; without one, the world has no pictures and is made faster.
+        stage: cleared and built upon, its owner closes it; by default one of the world's own. Worlds that share one must
+            not live at the same time.
     """
 
     def __init__(self, settings: WorldSettings, seed: int, start: State = START,
                  textures: SceneTextures = SceneTextures(), pieces: Pieces | None = None,
-                 camera: CameraSettings | None = None) -> None:
+                 camera: CameraSettings | None = None, stage: Stage | None = None) -> None:
         self._settings = settings
         self._pieces = pieces or load_pieces()
         self._cycles = 0
-        with quiet_stdout():
-            self._client: BulletClient | None = BulletClient(pybullet.DIRECT)
-            renderer = open_renderer(self._client, camera.renderer) if camera else None
-        client, layout = self._client, settings.layout
+        self._own_stage = None if stage else Stage(camera.renderer if camera else None)
+        stage = stage or self._own_stage
+        client, layout = stage.clear(), settings.layout
+        self._client = client
         set_up_physics(client, settings.physics, settings.cycle)
         self._robot = SimulatedRobot(client, settings.servos, settings.physics, settings.cycle, layout.start_joints,
                                      draw_arm_errors(settings.arm_errors))
@@ -71,7 +82,7 @@ class World:
         if camera:
             for block in ROOM:
                 self._bodies.scenery(*block)
-            self._camera = HeadCamera(client, renderer, self._robot, camera, self._pieces, self.placement,
+            self._camera = HeadCamera(client, stage.renderer, self._robot, camera, self._pieces, self.placement,
                                       tuple(self._tubes.values()), textures, scratch_folder(), seed)
 
     def _fill(self, name: str, colours: str) -> list[tuple[str, int]]:
@@ -138,13 +149,13 @@ class World:
         return [(colour, np.array(self._client.getBasePositionAndOrientation(ball)[0])) for colour, ball in self._balls]
 
     def put_ball(self, index: int, centre: np.ndarray) -> None:
-        """Put the ball that `ball_positions` lists at `index` elsewhere, centre (3,) in `base` [m], at rest; for `faults` only."""
+        """Put the ball that `ball_positions` lists at `index` at rest with its centre (3,) in `base` [m]; for `faults` only."""
         ball = self._balls[index][1]
         self._client.resetBasePositionAndOrientation(ball, np.asarray(centre).tolist(), (0.0, 0.0, 0.0, 1.0))
         self._client.resetBaseVelocity(ball, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def contacts(self) -> set[tuple[str, str]]:
-        """Return the pairs of things that touch one another now, by name (links of the robot, tubes, table, board, balls)."""
+        """Return the pairs of things that touch one another now, by name: robot's links, tubes, table, board, balls."""
         pairs = set()
         for contact in self._client.getContactPoints():
             if contact[8] <= 0.0:
@@ -175,9 +186,17 @@ class World:
             raise SimulationError("camera: this world was made without one; expected World(..., camera=...)")
         return self._camera
 
+    def remember(self) -> Snapshot:
+        """Return all that moves as it is now, for `go_back`."""
+        return Snapshot(self._client.saveState(), self._robot.servo_state(), self._cycles)
+
+    def go_back(self, snapshot: Snapshot) -> None:
+        """Let everything be as it was when it was remembered, time included; for trials that share a beginning."""
+        self._client.restoreState(snapshot.bullet_state)
+        self._robot.set_servo_state(snapshot.servos)
+        self._cycles = snapshot.cycles
+
     def close(self) -> None:
-        """Free the world's physics and renderer; a second call does nothing."""
-        if self._client is not None:
-            with quiet_stdout():
-                self._client.disconnect()
-            self._client = None
+        """Free the world's physics and renderer, unless they are another's; a second call does nothing."""
+        if self._own_stage is not None:
+            self._own_stage.close()

@@ -105,7 +105,9 @@ class CameraModel:
         directions = np.ones((len(flat), 3))
         if len(flat):
             until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-9)
-            straight = cv2.undistortPointsIter(flat, self.matrix, self.distortion, np.eye(3), np.eye(3), until)
+            # One function from OpenCV 5 on.
+            undistort = getattr(cv2, "undistortPointsIter", None) or cv2.undistortPoints
+            straight = undistort(flat, self.matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=until)
             directions[:, :2] = straight.reshape(-1, 2)
         return directions.reshape(*pixels.shape[:-1], 3)
 

@@ -8,6 +8,7 @@ that decides or measures below therefore looks at that half alone.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
@@ -33,7 +34,7 @@ class FootSettings:
     half_arc_rad: float = field(metadata={"min": 0.3, "max": 1.57})
     search_px: float = field(metadata={"min": 1.0})
     smallest_step: float = field(metadata={"min": 0.01, "max": 1.0})
-    edge_band_px: float = field(metadata={"min": 0.1})
+    edge_band: float = field(metadata={"min": 0.1})
     smallest_arc_share: float = field(metadata={"min": 0.05, "max": 1.0})
     smallest_agreement: float = field(metadata={"min": 0.05, "max": 1.0})
     brightest_rim: float = field(metadata={"min": 0.01, "max": 1.0})
@@ -49,13 +50,21 @@ class Foot:
 
 
 def find_feet(
-    brightness: np.ndarray, below_camera: np.ndarray, radius_px: float, rim_px: float, settings: FootSettings
+    brightness: np.ndarray,
+    wiped: np.ndarray,
+    below_camera: np.ndarray,
+    camera_pixel: Callable[[np.ndarray], float],
+    radius_px: float,
+    rim_px: float,
+    settings: FootSettings,
 ) -> list[Foot]:
     """Find the feet in a rectified picture.
 
     Args:
         brightness: (rows, columns) float32, 0 = printed black, 1 = white paper; what is not paper must be set to 1.
+        wiped: (rows, columns) bool, what was set to 1: a foot beside it ends there only in this picture.
         below_camera: (2,) the point of the sheet's plane right below the camera [px], usually outside of the picture.
+        camera_pixel: tells for a place (2,) of the picture how long a pixel of the camera is there [px].
         radius_px: radius of the foot's disc.
         rim_px: width of the disc outside of the taped wall.
 
@@ -63,11 +72,14 @@ def find_feet(
         Feet that do not overlap, the best seen first.
     """
     feet: list[Foot] = []
+    wiped = wiped.astype(np.float32)
     for centre in _candidates(brightness, radius_px, settings):
         # A foot draws several circles; once it is seen well, its other circles need no fit.
         if any(foot.arc_share > WELL_SEEN and np.linalg.norm(foot.centre - centre) < radius_px for foot in feet):
             continue
-        foot = _fit(brightness, centre, below_camera, radius_px, rim_px, settings)
+        # Where the camera sees the paper coarsely, the outline is as jagged as its pixels are long.
+        band_px = settings.edge_band * camera_pixel(centre)
+        foot = _fit(brightness, wiped, centre, below_camera, radius_px, rim_px, band_px, settings)
         if foot is not None:
             feet.append(foot)
     kept: list[Foot] = []
@@ -96,10 +108,12 @@ def _candidates(brightness: np.ndarray, radius_px: float, settings: FootSettings
 
 def _fit(
     brightness: np.ndarray,
+    wiped: np.ndarray,
     centre: np.ndarray,
     below_camera: np.ndarray,
     radius_px: float,
     rim_px: float,
+    band_px: float,
     settings: FootSettings,
 ) -> Foot | None:
     """Fit a circle of known radius to the dark-to-bright steps facing the camera; None if they are not a foot's."""
@@ -108,13 +122,14 @@ def _fit(
         facing = np.arctan2(*(below_camera - centre)[::-1])
         angles = facing + np.linspace(-settings.half_arc_rad, settings.half_arc_rad, RAYS)
         outward = np.column_stack([np.cos(angles), np.sin(angles)])
-        profiles = sample(brightness, centre + (radius_px + offsets[:, None]) * outward[:, None], PAPER)
-        steps, errors = rising_edges(profiles, offsets, EDGE_REACH_PX, settings.smallest_step)
-        band = settings.edge_band_px
+        lines = centre + (radius_px + offsets[:, None]) * outward[:, None]
+        steps, errors = rising_edges(sample(brightness, lines, PAPER), offsets, EDGE_REACH_PX, settings.smallest_step)
+        # A line that runs into what was wiped ends there, not at the foot's edge.
+        steps &= ~((sample(wiped, lines, 0.0) > 0) & (offsets < errors[:, None] + EDGE_REACH_PX)).any(axis=1)
         if steps.sum() < FEWEST_RAYS:
             return None
         # Edges off the circle count little, yet enough to draw in a candidate that starts a few pixels away.
-        weights = np.where(steps, 1 / (1 + (errors / band) ** 2) ** 2, 0.0)
+        weights = np.where(steps, 1 / (1 + (errors / band_px) ** 2) ** 2, 0.0)
         normal = outward.T @ (weights[:, None] * outward)
         if np.linalg.det(normal) < 1e-3:
             return None
@@ -122,7 +137,7 @@ def _fit(
         centre = centre + shift
         if np.linalg.norm(shift) < 0.03:
             break
-    good = steps & (np.abs(errors - outward @ shift) < band)
+    good = steps & (np.abs(errors - outward @ shift) < band_px)
     share = float(good.mean())
     # The upright disc of a fallen tube has an outline all round, but not that of a circle on the paper.
     if share < settings.smallest_arc_share or share < settings.smallest_agreement * steps.mean():

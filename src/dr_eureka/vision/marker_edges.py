@@ -76,7 +76,7 @@ def _lines(shares: np.ndarray, distance: np.ndarray, found: np.ndarray) -> np.nd
         if ((weights > 0).sum(axis=1) < fewest).any():
             return None
         weighted = weights[:, :, None] * design
-        lines = np.linalg.solve(design.T @ weighted, (weighted * distance[:, :, None]).sum(axis=1))
+        lines = np.linalg.solve(design.T @ weighted, (weighted * distance[:, :, None]).sum(axis=1)[..., None])[..., 0]
     return lines
 
 

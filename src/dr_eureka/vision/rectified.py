@@ -56,11 +56,24 @@ def rectify(image: np.ndarray, camera: CameraModel, camera_from_sheet: np.ndarra
     Returns:
         Picture of the sheet on `grid`; white where the camera does not look.
     """
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    image_from_grid = _image_from_grid(camera, camera_from_sheet, grid)
+    return cv2.warpPerspective(image, image_from_grid, grid.size, flags=flags, borderValue=(255, 255, 255))
+
+
+def camera_pixel_size(camera: CameraModel, camera_from_sheet: np.ndarray, grid: SheetGrid, pixel: np.ndarray) -> float:
+    """Return how long a pixel of the camera is on `grid` at a pixel (2,) of it, along its longer side [px]."""
+    image_from_grid = _image_from_grid(camera, camera_from_sheet, grid)
+    column, row, depth = image_from_grid @ [*pixel, 1.0]
+    derivative = (image_from_grid[:2, :2] - np.outer((column, row), image_from_grid[2, :2]) / depth) / depth
+    return float(1.0 / np.linalg.svd(derivative, compute_uv=False)[-1])
+
+
+def _image_from_grid(camera: CameraModel, camera_from_sheet: np.ndarray, grid: SheetGrid) -> np.ndarray:
+    """Return the homography (3, 3) from pixels of `grid` to those of the camera."""
     (x0, y0), (x1, y1) = grid.points(np.array([[0.0, 0.0], [1.0, 1.0]]))
     points_from_pixels = np.array([[0.0, x1 - x0, x0], [y1 - y0, 0.0, y0], [0.0, 0.0, 1.0]])
-    image_from_pixels = camera.matrix @ camera_from_sheet[:3][:, [0, 1, 3]] @ points_from_pixels
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return cv2.warpPerspective(image, image_from_pixels, grid.size, flags=flags, borderValue=(255, 255, 255))
+    return camera.matrix @ camera_from_sheet[:3][:, [0, 1, 3]] @ points_from_pixels
 
 
 def paper_brightness(
@@ -73,7 +86,7 @@ def paper_brightness(
     Args:
         rectified: (rows, columns) uint8 on `grid`.
         markers: the markers that are in view, at least three.
-        margin_m: width of the strip round each marker, seen or not, that is set to 1 with it [m].
+        margin_m: width of the strip round each marker, seen or not, that is set to 1 with it (`wiped_out`) [m].
         smallest_contrast: least difference of paper and print [grey levels].
 
     Returns:
@@ -92,8 +105,17 @@ def paper_brightness(
     rows, columns = (axis.astype(np.float32) for axis in np.indices(rectified.shape, sparse=True))
     paper = np.maximum(by_column * columns + by_row * rows + offset, np.float32(smallest_contrast))
     brightness = np.clip((rectified - np.float32(black)) / paper, 0.0, 1.0)
-    margin = margin_m * grid.pixels_per_metre
-    for square in squares.values():
-        (left, top), (right, bottom) = np.maximum(np.rint(square + [[-margin], [margin]]).astype(int), 0)
-        brightness[top:bottom, left:right] = 1.0
+    brightness[wiped_out(grid, margin_m)] = 1.0
     return brightness
+
+
+def wiped_out(grid: SheetGrid, margin_m: float) -> np.ndarray:
+    """Return which pixels of `grid` belong to a marker or to the strip round it, (rows, columns) bool."""
+    columns, rows = grid.size
+    wiped = np.zeros((rows, columns), bool)
+    margin = margin_m * grid.pixels_per_metre
+    for marker in grid.pieces.marker_centres:
+        square = grid.pixels(grid.pieces.marker_corners(marker)[[0, 2]])
+        (left, top), (right, bottom) = np.maximum(np.rint(square + [[-margin], [margin]]).astype(int), 0)
+        wiped[top:bottom, left:right] = True
+    return wiped

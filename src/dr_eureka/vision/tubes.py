@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import combinations
 
 import cv2
@@ -14,7 +15,7 @@ from dr_eureka.resources import load_yaml
 from dr_eureka.settings import build
 from dr_eureka.vision.camera import CameraModel
 from dr_eureka.vision.feet import Foot, FootSettings, find_feet
-from dr_eureka.vision.rectified import SheetGrid, paper_brightness, rectify
+from dr_eureka.vision.rectified import SheetGrid, camera_pixel_size, paper_brightness, rectify, wiped_out
 from dr_eureka.vision.sheet import FEWEST_MARKERS, SheetError, SheetPose, SheetSettings, locate_sheet
 from dr_eureka.vision.tube_faults import FaultSettings, litter_on_sheet, other_dictionary
 
@@ -118,7 +119,7 @@ def locate_tubes(
     if brightness is None:
         reason = f"markers have less than {settings.smallest_contrast:g} grey levels of contrast"
         return TubeScene(TubeResult.NO_SHEET, {}, None, sheet.markers, reason)
-    feet = _feet(brightness, sheet, grid, settings)
+    feet = _feet(brightness, camera, sheet, grid, settings)
     places = sorted((_place(foot, sheet, grid, settings) for foot in feet), key=lambda place: -place.position[1])
     if len(feet) < len(NAMES):
         result, reason = _why_missing(straight, value, brightness, camera, sheet, feet, grid, settings)
@@ -147,11 +148,15 @@ def _brightness(
     return paper_brightness(rectified, grid, sheet.markers, settings.marker_margin_m, settings.smallest_contrast)
 
 
-def _feet(brightness: np.ndarray, sheet: SheetPose, grid: SheetGrid, settings: TubeSettings) -> list[Foot]:
+def _feet(
+    brightness: np.ndarray, camera: CameraModel, sheet: SheetPose, grid: SheetGrid, settings: TubeSettings
+) -> list[Foot]:
     below_camera = grid.pixels(np.linalg.inv(sheet.camera_from_sheet)[:2, 3])
     radius_px = grid.pieces.foot_radius * grid.pixels_per_metre
     rim_px = radius_px - grid.pieces.tube_outer_radius * grid.pixels_per_metre
-    return find_feet(brightness, below_camera, radius_px, rim_px, settings.foot)
+    wiped = wiped_out(grid, settings.marker_margin_m)
+    pixel_size = partial(camera_pixel_size, camera, sheet.camera_from_sheet, grid)
+    return find_feet(brightness, wiped, below_camera, pixel_size, radius_px, rim_px, settings.foot)
 
 
 def _fault_of(places: list[TubePlace], pieces: Pieces, settings: TubeSettings) -> tuple[str, str]:
@@ -181,7 +186,7 @@ def _why_missing(
     count = f"{len(feet)} tube feet seen on the sheet, expected {len(NAMES)}"
     around = SheetGrid(pieces, settings.pixels_per_metre, faults.margin_m)
     half = np.array([pieces.sheet_depth, pieces.sheet_width]) / 2
-    anywhere = _feet(_brightness(value, camera, sheet, around, settings), sheet, around, settings)
+    anywhere = _feet(_brightness(value, camera, sheet, around, settings), camera, sheet, around, settings)
     outside = sum((np.abs(around.points(foot.centre)) > half).any() for foot in anywhere)
     if outside:
         return TubeResult.TUBE_OFF_SHEET, f"{count}; {outside} beside it"
