@@ -34,6 +34,10 @@ class BadInputTest(unittest.TestCase):
         line = self.complaint("dr_eureka_main", "main.launch", strategy="luckiest")
         self.assertIn("/dr_eureka_main/strategy: is 'luckiest'; expected one of fewest", line)
 
+    def test_a_camera_calibration_that_is_not_there_ends_the_launch(self):
+        line = self.complaint("dr_eureka_main", "main.launch", camera_calibration="/nowhere/camera.yaml")
+        self.assertIn("/nowhere/camera.yaml", line)
+
     def test_a_start_that_is_no_state_ends_the_simulation(self):
         line = self.complaint("fake_robotis_manager", "robot_sim.launch", start="RRGGP|P")
         self.assertIn("/fake_robotis_manager/start: RRGGP|P", line)

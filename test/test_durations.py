@@ -4,7 +4,8 @@ from dataclasses import asdict
 
 import pytest
 
-from dr_eureka.bench.durations import GameFileError, measure, read_games, rewrite
+from dr_eureka.bench.durations import GameFileError, measure, read_games
+from dr_eureka.bench.planner_file import rewrite
 from dr_eureka.cli.measure_durations import main
 from dr_eureka.game.actions import actions_for
 from dr_eureka.game.planner import Planner
@@ -13,15 +14,16 @@ from dr_eureka.game.state import START, State
 from dr_eureka.resources import resource_path
 
 PICK = {"from_home": 4.0, "after_place": 3.0}
-PLACE, READY, UPRIGHT, HOME, POUR = 5.0, {"left": 1.5, "center": 1.0, "right": 1.75}, 0.75, 1.25, 2.5
+PLACE, READY, HOME, POUR = 5.0, {"left": 1.5, "center": 1.0, "right": 1.75}, 1.25, 2.5
+UPRIGHT = {"lock": 0.75, "direct": 0.5}
 
 
-def game(goal, strategy="fastest"):
-    """Return a game as game.json tells it, with every action as long as it should be."""
-    planner = Planner(strategy)
+def game(goal, strategy="fastest", pour="lock", pause=0.0):
+    """Return a game as game.json tells it, with every action as long as it should be, and a look after every pour."""
+    planner = Planner(strategy, pour)
     actions, now, placed, poured = [], 7.0, set(), None
     for action in actions_for(planner.pours(START, State.parse(goal)), planner.reach):
-        upright = UPRIGHT if poured and poured != action.hand or poured and action.kind != "pour" else 0.0
+        upright = UPRIGHT[pour] if poured and poured != action.hand or poured and action.kind != "pour" else 0.0
         if action.kind == "pick":
             seconds = PICK["after_place" if action.hand in placed else "from_home"]
         elif action.kind == "place":
@@ -32,69 +34,120 @@ def game(goal, strategy="fastest"):
         poured = action.hand if action.kind == "pour" else None
         record = {key: value for key, value in asdict(action).items() if value}
         actions.append({**record, "start": now, "end": now + upright + seconds})
-        now += upright + seconds
+        now += upright + seconds + (pause if action.kind == "pour" else 0.0)
     actions[-1]["end"] += HOME
-    return {"solved": True, "actions": actions}
+    return {"solved": True, "pour": pour, "actions": actions}
 
 
 GAMES = [game("GR|PG|RP"), game("R|GP|PRG", "fewest"), game("PR|PRG|G", "fewest")]
 
 
-def test_what_actions_last_is_found_again():
-    found = measure(GAMES, "lock")
-    assert found["upright",].seconds == pytest.approx(UPRIGHT)
-    assert found["home",].seconds == pytest.approx(HOME)
-    assert found["home",].trials == len(GAMES)
-    for key, duration in found.items():
+def found_in(games):
+    """Return what is measured by its place under `durations`."""
+    found = measure(games)
+    assert {place for place, *_ in found} == {"durations"}
+    return {place[1:]: figure for place, figure in found.items()}
+
+
+@pytest.mark.parametrize("pause", [0.0, 1.8])
+def test_what_actions_last_is_found_again(pause):
+    games = [game("GR|PG|RP", pause=pause), game("R|GP|PRG", "fewest", pause=pause), game("PR|PRG|G", "fewest", pause=pause)]
+    found = found_in(games)
+    assert found["upright", "lock"]["seconds"] == UPRIGHT["lock"]
+    assert found["home",] == {"seconds": HOME, "trials": len(games)}
+    for key, figure in found.items():
         if key[0] == "pick":
-            assert duration.seconds == pytest.approx(PICK[key[1]])
+            assert figure["seconds"] == PICK[key[1]]
         elif key[0] == "place":
-            assert duration.seconds == pytest.approx(PLACE)
+            assert figure["seconds"] == PLACE
         elif key[0] == "pour":
-            assert key[1] == "lock" and duration.seconds == pytest.approx(POUR * key[2])
+            assert key[1] == "lock" and figure["seconds"] == POUR * key[2]
         elif key[0] == "ready":
-            assert duration.seconds == pytest.approx(READY[key[1]])
-    alone = sum(duration.trials for key, duration in found.items() if key[0] in ("pick", "place", "pour"))
-    assert alone == sum(len(game["actions"]) for game in GAMES)
+            assert key[1] == "lock" and figure["seconds"] == READY[key[2]]
+    alone = sum(figure["trials"] for key, figure in found.items() if key[0] in ("pick", "place", "pour"))
+    assert alone == sum(len(game["actions"]) for game in games)
+
+
+def test_each_game_counts_for_the_way_in_which_it_poured():
+    found = found_in([*GAMES, game("GR|PG|RP", pour="direct")])
+    assert {method: found["upright", method]["seconds"] for method in UPRIGHT} == UPRIGHT
+    assert found["home",]["trials"] == len(GAMES) + 1
+
+
+def test_actions_of_both_hands_at_once_each_last_as_long_as_both():
+    actions = [
+        {"kind": "pick", "hand": "left", "tube": "left", "start": 7.0, "end": 12.0},
+        {"kind": "pick", "hand": "right", "tube": "right", "start": 7.0, "end": 12.0},
+        {"kind": "pour", "hand": "left", "tube": "left", "count": 1, "start": 12.0, "end": 16.0},
+        {"kind": "place", "hand": "left", "tube": "left", "start": 16.0, "end": 22.0},
+        {"kind": "place", "hand": "right", "tube": "right", "start": 16.0, "end": 22.0},
+    ]
+    again = [dict(action, start=action["start"] + 15.0, end=action["end"] + 15.0) for action in actions]
+    found = found_in([{"solved": True, "pour": "lock", "actions": actions + again}])
+    assert found["pick", "from_home", "left", "left"] == found["pick", "from_home", "right", "right"] == {"seconds": 5.0, "trials": 1}
+    assert found["pick", "after_place", "right", "right"]["seconds"] == 5.0
+    # Both places begin with bringing the tubes upright; the second two end at home, the first two do not.
+    assert found["home",] == {"seconds": 0.0, "trials": 2}
 
 
 def test_what_cannot_be_told_apart_is_left_out():
     # One pour and its two places: no telling what of it was getting ready, or going home.
-    found = measure([game("RR|G|PPG", "fewest")], "lock")
+    found = found_in([game("RR|G|PPG", "fewest")])
     assert {key[0] for key in found} == {"pick"}
 
 
 def test_a_hand_that_has_been_home_since_starts_from_home_again():
     actions = [dict(action) for action in GAMES[0]["actions"]]
     later = [{**action, "start": action["start"] + 500.0, "end": action["end"] + 500.0} for action in actions]
-    once, twice = measure(GAMES[:1], "lock"), measure([{**GAMES[0], "actions": actions + later}], "lock")
-    assert {key: found.trials for key, found in twice.items()} == {key: 2 * found.trials for key, found in once.items()}
+    once, twice = measure(GAMES[:1]), measure([{**GAMES[0], "actions": actions + later}])
+    assert twice.keys() == once.keys()
+    assert all(twice[key]["trials"] == 2 * once[key]["trials"] for key in once)
 
 
 def test_the_action_that_ended_a_failed_game_does_not_count():
     failed = {**GAMES[1], "solved": False, "actions": GAMES[1]["actions"][:2] + [{**GAMES[1]["actions"][2], "end": 900.0}]}
-    assert all(duration.seconds < 10.0 for duration in measure([failed], "lock").values())
+    assert all(figure["seconds"] < 10.0 for figure in measure([failed]).values())
 
 
 def test_the_yaml_gets_new_figures_and_keeps_all_else():
     text = resource_path(PLANNER_FILE).read_text()
-    changed = rewrite(text, measure(GAMES, "lock"))
+    changed = rewrite(text, measure(GAMES))
     assert rewrite(text, {}) == text
     before, after = text.splitlines(), changed.splitlines()
     assert len(before) == len(after)
     assert [line.partition("#")[2] for line in before] == [line.partition("#")[2] for line in after]
-    assert f"upright: {{seconds: {UPRIGHT}, trials: " in changed
+    assert f"    lock: {{seconds: {UPRIGHT['lock']}, trials: " in changed
 
 
 def test_the_command_shows_the_figures_beside_those_of_the_yaml(tmp_path, capsys):
     file = tmp_path / "game.json"
     file.write_text(json.dumps({"games": GAMES}))
-    assert main([str(tmp_path), "--pour", "direct"]) == 0
+    assert main([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("pour direct 1 ") for line in lines)
+    assert any(line.startswith("pour lock 1 ") for line in lines)
     line = next(line for line in lines if line.startswith("upright"))
-    known = load_planner_settings().durations.upright
-    assert line.split() == ["upright", f"{known.seconds:.2f}", str(known.trials), f"{UPRIGHT:.2f}", line.split()[-1]]
+    known = load_planner_settings().durations.upright["lock"]
+    assert line.split()[:-1] == ["upright", "lock", f"{known.seconds:.2f}", str(known.trials), f"{UPRIGHT['lock']:.2f}"]
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"pour": "sling"}, "pour is 'sling'; expected a game whose pour is lock or direct"),
+        ({"pour": None}, "pour is None"),
+        ({"actions": []}, "no duration can be told from these games"),
+    ],
+)
+def test_a_game_that_tells_nothing_is_refused(tmp_path, capsys, change, message):
+    (tmp_path / "game.json").write_text(json.dumps({**GAMES[0], **change}))
+    assert main([str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_game_of_before_that_does_not_tell_how_it_poured_is_refused(tmp_path, capsys):
+    (tmp_path / "game.json").write_text(json.dumps({key: value for key, value in GAMES[0].items() if key != "pour"}))
+    assert main([str(tmp_path)]) == 2
+    assert "it does not tell how it poured; expected a game whose pour is lock or direct" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"actions": [{}]}', '{"games": [3]}'])

@@ -15,7 +15,7 @@ from dr_eureka.behaviour.observation import NO_ANSWER, Answer, EngineView, Frame
 from dr_eureka.behaviour.plan_parts import next_part
 from dr_eureka.behaviour.report import GameCode, Phase
 from dr_eureka.control.codes import EngineCode, EngineState
-from dr_eureka.game.planner import plan_pours
+from dr_eureka.game.planner import Planner
 from dr_eureka.game.state import START, TUBES, Pour, State
 
 CARD_GAZE, SHEET_GAZE, WATCH_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87), Gaze(0.0, 0.4)
@@ -40,6 +40,7 @@ SETTINGS = FlowSettings(
     watch_gaze=WATCH_GAZE,
 )
 GOAL = State.parse("R|GG|PPR")
+PLANNER = Planner("fewest", "lock")
 PLACES = {"left": (0.44, 0.11, 0.775), "center": (0.44, 0.0, 0.775), "right": (0.44, -0.11, 0.775)}
 
 
@@ -79,7 +80,7 @@ class World:
         self.frames = True
         self.engine_speaks = True
         self.flow = GameFlow(
-            settings, goal, games, plan_pours, "lock", Looks(self.card_look, self.tube_look, self.read_held), self,
+            settings, goal, games, PLANNER, Looks(self.card_look, self.tube_look, self.read_held), self,
             self if robot else None, confirm_card,
         )
 
@@ -218,6 +219,19 @@ def test_actions_carry_the_times_between_which_the_engine_was_at_them():
     assert third.start_s == third.end_s == fourth.start_s
 
 
+def test_actions_of_both_hands_at_once_begin_and_end_together():
+    world = World(goal=GOAL)
+    world.until_playing()
+    for index, at_once, steps in ((1, 2, 10), (2, 1, 5)):
+        world.engine(EngineState.BUSY, action_index=index)
+        world.now = replace(world.now, engine=replace(world.now.engine, at_once=at_once))
+        for _ in range(steps):
+            report = world.step()
+    first, second, third = report.actions
+    assert (first.start_s, first.end_s) == (second.start_s, second.end_s)
+    assert first.end_s - first.start_s == pytest.approx(1.0) and third.start_s == first.end_s
+
+
 def test_a_given_goal_is_played_without_looking_for_a_card():
     world = World(goal=GOAL)
     world.until_playing()
@@ -238,6 +252,13 @@ def test_until_the_tubes_are_seen_the_start_is_not_known():
     assert world.until(Phase.LOOKING_FOR_TUBES).start == ""
     world.until_playing()
     assert world.flow.report().start == "RR|GG|PP"
+
+
+def test_every_game_tells_what_plans_make_best_and_how_balls_are_poured():
+    world = World(goal=START, games=2)
+    world.until(Phase.LOOKING_FOR_CARD)
+    told = {(report.game, report.strategy, report.pour) for report in world.reports}
+    assert told == {(0, "fewest", "lock"), (1, "fewest", "lock")}
 
 
 def test_a_goal_that_the_tubes_hold_already_is_solved_without_a_motion_of_the_arms():
@@ -286,7 +307,7 @@ def world_in_pause(**in_hands):
 
 
 def test_tubes_in_the_hands_are_looked_at_after_a_pour_and_what_is_right_goes_on():
-    after = START.after(plan_pours(START, State.parse("R|G|PPRG"))[0])
+    after = START.after(PLANNER.pours(START, State.parse("R|G|PPRG"))[0])
     world, pours = world_in_pause(**{tube: after.tube(tube) for tube in (pours_tubes(START, "R|G|PPRG"))})
     world.step()
     assert world.flow.looking and world.answers == []
@@ -328,7 +349,7 @@ def test_a_false_alarm_about_tubes_in_the_hands_costs_no_new_plan():
 
 
 def test_what_the_fingers_hide_is_taken_for_right():
-    after = START.after(plan_pours(START, State.parse("R|G|PPRG"))[0])
+    after = START.after(PLANNER.pours(START, State.parse("R|G|PPRG"))[0])
     hidden = {tube: "?" * min(2, len(after.tube(tube))) + after.tube(tube)[2:] for tube in pours_tubes(START, "R|G|PPRG")}
     world, _ = world_in_pause(**hidden)
     for _ in range(5):
@@ -349,13 +370,13 @@ def test_hands_of_which_no_image_comes_are_taken_for_right_at_the_limit():
 
 def pours_tubes(start, goal):
     """Return the two tubes of the first pour from a state to another."""
-    first = plan_pours(start, State.parse(goal))[0]
+    first = PLANNER.pours(start, State.parse(goal))[0]
     return first.source, first.target
 
 
 def test_a_long_plan_is_carried_out_in_parts_with_a_look_after_each():
     goal = State.parse("PR|PRG|G")
-    whole = plan_pours(START, goal)
+    whole = PLANNER.pours(START, goal)
     part = next_part(START, whole, 3)
     middle = part.expected
     world = World(goal=goal, results=[str(middle)])

@@ -9,8 +9,8 @@ from dr_eureka.behaviour.scorecard import Ruling, Scorecard
 from dr_eureka.game.actions import Action
 from dr_eureka.game.state import TUBES, Pour
 
-KEYS = {"seed", "start", "card", "goal", "verdict", "solved", "balls_lost", "pours", "replans", "simulated_seconds", "wall_seconds",
-        "actions"}
+KEYS = {"seed", "start", "card", "goal", "strategy", "pour", "verdict", "solved", "balls_lost", "pours", "replans",
+        "simulated_seconds", "wall_seconds", "actions"}
 
 
 def report(game=0, games=1, start="RR|GG|PP", goal="R|GG|PPR", code=GameCode.SOLVED, card="R|GG|PPR"):
@@ -19,7 +19,9 @@ def report(game=0, games=1, start="RR|GG|PP", goal="R|GG|PPR", code=GameCode.SOL
         ActionRecord(Action("pour", "left", "left", "right", "right", 1), 9.0, 15.51234),
     )
     phase = Phase.FINISHED if code == GameCode.SOLVED else Phase.FAILED
-    return GameReport(phase, code, game, games, start, card, goal, (Pour("left", "right"),), actions, 0, 31.25, 12.5, "")
+    return GameReport(
+        phase, code, game, games, start, card, goal, "fewest", "lock", (Pour("left", "right"),), actions, 0, 31.25, 12.5, ""
+    )
 
 
 def ruling(state="R|GG|PPR", balls_lost=0, standing=TUBES):
@@ -36,6 +38,7 @@ def test_one_game_has_its_keys_at_the_top_level():
     result = written(card)
     assert KEYS <= set(result) and "games" not in result
     assert (result["seed"], result["verdict"], result["solved"], result["balls_lost"], result["pours"]) == (5, "SOLVED", True, 0, 1)
+    assert (result["strategy"], result["pour"]) == ("fewest", "lock")
     assert (result["simulated_seconds"], result["wall_seconds"]) == (31.25, 12.5)
     assert result["actions"] == [
         {"kind": "pick", "hand": "left", "tube": "left", "start": 3.2, "end": 9.0},

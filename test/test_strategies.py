@@ -28,7 +28,8 @@ def every_action_costs_one():
     none, one, hands = Measured(0.0), Measured(1.0), {"left": ("left", "center"), "right": ("center", "right")}
     each = {hand: dict.fromkeys(tubes, one) for hand, tubes in hands.items()}
     pours = {1: one, 2: one, 3: one, 4: Measured(600.0)}
-    durations = Durations(PickDurations(each, each), each, dict.fromkeys(TUBES, none), none, none, {"direct": pours})
+    ready, upright = {"direct": dict.fromkeys(TUBES, none)}, {"direct": none}
+    durations = Durations(PickDurations(each, each), each, ready, upright, none, {"direct": pours})
     return replace(SETTINGS, hands_at_once=True, durations=durations, outcomes={"direct": SETTINGS.outcomes["direct"]})
 
 
@@ -43,7 +44,7 @@ def every_failure_is_final():
 
 def solve_for(goals, settings, method="direct", uncertain=True):
     """Solve for some goals only, which takes a moment where all of them take seconds."""
-    graph = replace(state_graph(), representatives=np.array([state_graph().numbers[goal] for goal in goals]))
+    graph = replace(state_graph(), representatives=np.array([state_graph().numbers[goal.tubes] for goal in goals]))
     return solve(graph, duration_prices(settings, method), outcome_shares(settings, method) if uncertain else None)
 
 
@@ -53,7 +54,7 @@ def planner_for(monkeypatch, tmp_path):
 
     def make(goal, *arguments, settings=None):
         graph, every = state_graph(), np.zeros(len(all_states()), int)
-        one = replace(graph, representatives=np.array([graph.numbers[goal]]), goal_class=every, recolouring=every)
+        one = replace(graph, representatives=np.array([graph.numbers[goal.tubes]]), goal_class=every, recolouring=every)
         monkeypatch.setattr("dr_eureka.game.planner.state_graph", lambda: one)
         return Planner(*arguments, settings=settings, cache=tmp_path)
 
@@ -86,11 +87,13 @@ def test_where_no_pour_goes_wrong_the_surest_plan_is_the_fastest():
     assert sure.cost == pytest.approx(fast.cost, abs=1e-6)
 
 
-def test_no_sequence_of_single_actions_is_faster_than_fastest():
-    texts = explore(str(START))
-    graph = ActionGraph(texts, Costs.seconds(SETTINGS, "lock"), SETTINGS.reach)
-    planner = Planner("fastest", "lock")
-    for start, goal in PAIRS[:10]:
+@pytest.mark.parametrize("at_once", [False, True])
+def test_no_sequence_of_actions_is_faster_than_fastest(planner_for, at_once):
+    texts, settings = explore(str(START)), replace(SETTINGS, hands_at_once=at_once)
+    graph = ActionGraph(texts, Costs.seconds(settings, "lock"), settings.reach)
+    goal = PAIRS[0][1]
+    planner = planner_for(goal, "fastest", "lock", settings=settings)
+    for start, _ in PAIRS[:10]:
         plan = planner.plan(start, goal)
         assert plan.cost == pytest.approx(graph.costs_from(str(start))[texts.index(str(goal))], abs=1e-6)
         assert plan.cost == pytest.approx(plan.seconds, abs=1e-6)
@@ -169,6 +172,20 @@ def test_hands_that_cannot_hold_two_tubes_have_no_plan(planner_for):
     for ask in (planner.plan, planner.pours, planner.next_pour):
         with pytest.raises(ReachError, match="left hand: left; right hand: none"):
             ask(START, goal)
+
+
+def test_a_plan_that_would_never_end_if_pours_did_what_they_should_is_refused(planner_for):
+    def outcome(held, count):
+        return Outcome(1.0) if count == held else Outcome(0.1, more=0.9)
+
+    table = {held: {count: outcome(held, count) for count in range(1, held + 1)} for held in range(1, 5)}
+    settings = replace(SETTINGS, outcomes={**SETTINGS.outcomes, "direct": table})
+    planner = planner_for(START, "surest", "direct", settings=settings)
+    start = State.parse("|GG|PPRR")
+    for ask in (planner.plan, planner.pours):
+        with pytest.raises(PlannerError, match=r"\|GG\|PPRR to RR\|GG\|PP: the surest way counts on pours that go wrong"):
+            ask(start, START)
+    assert planner.next_pour(start, START) is not None
 
 
 def test_unknown_words_are_refused_with_those_that_are_known():

@@ -6,7 +6,7 @@ tells everything it finds out to a `Listener`. It never waits: each wait is a ph
 
 from __future__ import annotations
 
-from typing import Callable, Optional
+from typing import Optional
 
 from dr_eureka.behaviour.card_confirmation import CardConfirmation, ConfirmAnswer, ConfirmCode
 from dr_eureka.behaviour.failure import Failure, failure_in
@@ -21,6 +21,7 @@ from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Liste
 from dr_eureka.control.codes import EngineState
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.actions import actions_for
+from dr_eureka.game.planner import Planner
 from dr_eureka.game.state import Pour, State
 
 
@@ -28,9 +29,9 @@ class GameFlow:
     """Plays `games` games in a row.
 
     What the tubes hold is seen before each game, never believed. `goal` replaces the card of the first game. With
-    `confirm_card` a person must confirm or correct what was read from a card before the robot goes on. `plan` gives the
-    pours from a state to a goal; they are carried out in parts. What the tubes hold after each is looked at, and if a pour
-    went wrong, the rest is planned from what was seen. A ball that is in no tube ends the game. Without a `robot` (a
+    `confirm_card` a person must confirm or correct what was read from a card before the robot goes on. The pours of a plan
+    are carried out in parts. What the tubes hold after each is looked at, and if a pour went wrong, the rest is planned
+    from what was seen. A ball that is in no tube ends the game. Without a `robot` (a
     replayed recording) nothing is commanded and nothing asked: every image is looked at, for the card first and then for the
     tubes, and the game ends when both are found.
     """
@@ -40,28 +41,26 @@ class GameFlow:
         settings: FlowSettings,
         goal: Optional[State],
         games: int,
-        plan: Callable[[State, State], tuple[Pour, ...]],
-        pour: str,
+        planner: Planner,
         looks: Looks,
         listener: Listener,
         robot: Optional[Robot],
         confirm_card: bool = False,
     ):
         self._settings = settings
-        self._plan = plan
+        self._planner = planner
         self._looks = looks
         self._listener = listener
         self._robot = robot
         self._confirm_card = confirm_card and robot is not None
         self._games = games
-        self._pour_method = pour
         self._phase = Phase.WAITING_FOR_ENGINE
         self._phase_began_s = 0.0
         self._message = ""
         self._now: Optional[Observation] = None
         self._look: Optional[GuidedLook] = None
         self._confirmation: Optional[CardConfirmation] = None
-        self._game = GameRecord(0, goal=goal)
+        self._game = GameRecord(0, planner.strategy, planner.method, goal=goal)
         self._pours_ahead: tuple[Pour, ...] = ()
         self._playing: Optional[PartInPlay] = None
         self._earlier: tuple[tuple[Pour, ...], tuple[ActionRecord, ...]] = (), ()
@@ -212,7 +211,7 @@ class GameFlow:
         goal = self._game.goal
         self._enter(Phase.PLANNING)
         try:
-            self._pours_ahead = self._plan(seen.state, goal)
+            self._pours_ahead = self._planner.pours(seen.state, goal)
             actions = actions_for(self._pours_ahead)
         except DrEurekaError as error:
             self.fail(GameCode.NO_PLAN, str(error))
@@ -233,7 +232,7 @@ class GameFlow:
         self._game.pours += part.pours
         self._enter(Phase.PLAYING)
         self._playing = PartInPlay(
-            part, seen.tubes, self._pour_method, self._robot, self._settings, self._now, self._game.since_began_s,
+            part, seen.tubes, self._game.pour, self._robot, self._settings, self._now, self._game.since_began_s,
             self._looks.read_held,
         )
 
@@ -280,6 +279,7 @@ class GameFlow:
         self._game.code = code
         self._enter(Phase.FINISHED, message)
         if self._game.number + 1 < self._games:
-            self._game = GameRecord(self._game.number + 1, start=self._game.goal, began=self._now)
+            ended = self._game
+            self._game = GameRecord(ended.number + 1, ended.strategy, ended.pour, start=ended.goal, began=self._now)
             self._message = ""
             self._begin_card_look()

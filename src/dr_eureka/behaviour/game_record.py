@@ -15,10 +15,13 @@ class GameRecord:
     """What is known of game number `number`, from 0.
 
     `start` is what the tubes held at the beginning, as far as is known: until they are seen, what the game before left.
-    `goal` differs from `card` when a person corrected it, and there is no `card` when the goal was given.
+    `goal` differs from `card` when a person corrected it, and there is no `card` when the goal was given. `strategy` and
+    `pour` tell what plans make best and how balls are poured.
     """
 
     number: int
+    strategy: str
+    pour: str
     start: Optional[State] = None
     goal: Optional[State] = None
     card: Optional[State] = None
@@ -42,6 +45,8 @@ class GameRecord:
             start=str(self.start or ""),
             card=str(self.card or ""),
             goal=str(self.goal or ""),
+            strategy=self.strategy,
+            pour=self.pour,
             pours=self.pours,
             actions=self.actions,
             replans=self.replans,

@@ -51,7 +51,8 @@ class Frame:
 class EngineView:
     """The control engine's last status, and the wall time at which it was heard.
 
-    `held` has base_from_tube (4, 4) of each tube in a hand while the engine pauses for a look after a pour, else nothing.
+    `at_once`: how many actions, up to `action_index`, are under way at the same time. `held` has base_from_tube (4, 4) of each tube
+    in a hand while the engine pauses for a look after a pour, else nothing.
     """
 
     state: str
@@ -61,6 +62,7 @@ class EngineView:
     message: str
     heard_wall_s: float
     held: Mapping[str, np.ndarray] = field(default_factory=dict)
+    at_once: int = 1
 
 
 @dataclass(frozen=True)

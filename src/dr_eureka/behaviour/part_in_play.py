@@ -41,6 +41,7 @@ class PartInPlay:
         self._read_held = read_held
         self._held_look: Optional[HeldLook] = None
         self._paused_at = self._answered = -1
+        self._under_way = 1
         self._settings = settings
         self._actions = part.actions
         self._places = places
@@ -105,10 +106,11 @@ class PartInPlay:
     def _follow(self, engine: EngineView, now_s: float) -> None:
         """Note when actions begin and end; the engine may have finished several since the last status.
 
-        A pour ends when the engine pauses for the look after it.
+        A pour ends when the engine pauses for the look after it, actions of both hands at once end together.
         """
         if self._records and len(self._records) - 1 != self._paused_at:
-            last = self._records[-1]
-            self._records[-1] = ActionRecord(last.action, last.start_s, now_s)
+            under_way = self._records[-self._under_way :]
+            self._records[-self._under_way :] = [ActionRecord(record.action, record.start_s, now_s) for record in under_way]
+        self._under_way = engine.at_once
         news = self._actions[len(self._records) : engine.action_index + 1]
         self._records += [ActionRecord(action, now_s, now_s) for action in news]

@@ -75,7 +75,7 @@ class GameReport:
 
     `start` is what the tubes held at the beginning, empty until that was seen, or, after the first game, what the game
     before left. `card` is the state read from the card, empty when none was read; `goal` differs from it when a person
-    corrected it.
+    corrected it. `strategy` and `pour` tell what plans make best and how balls are poured.
     """
 
     phase: str
@@ -85,6 +85,8 @@ class GameReport:
     start: str
     card: str
     goal: str
+    strategy: str
+    pour: str
     pours: tuple[Pour, ...]
     actions: tuple[ActionRecord, ...]
     replans: int

@@ -42,6 +42,8 @@ class Scorecard:
                 "start": report.start or None,
                 "card": report.card or None,
                 "goal": report.goal or None,
+                "strategy": report.strategy,
+                "pour": report.pour,
                 "verdict": report.code,
                 "message": report.message,
                 "solved": ruling.solved(report.goal) if ruling else None,

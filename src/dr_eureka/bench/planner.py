@@ -28,6 +28,7 @@ STATES, EDGES, DIAMETER, CANCELLED = 1710, 3780, 14, 0.5181140895478782
 SPEED_UP = 100.0
 _PAIRS = 200
 _TURN = 20  # queries
+_ROUNDS = 5
 _LOADS = 5
 _LOAD_PROGRAM = """
 import time
@@ -141,8 +142,6 @@ def _checked_handling(
 
 def _checked_seconds(texts: list[str], pairs: list[tuple[State, State]], settings: PlannerSettings) -> list[Row]:
     """Compare `fastest` with Dijkstra's algorithm on single actions of two hands."""
-    if settings.hands_at_once:
-        return [Row("plans of fastest: not checked while hands_at_once is true", None, "share")]
     following = {text: {move[:3]: move.after for move in moves(text)} for text in texts}
     rows = []
     for method in settings.methods:
@@ -162,8 +161,6 @@ def _checked_seconds(texts: list[str], pairs: list[tuple[State, State]], setting
 
 def _checked_chances(texts: list[str], pairs: list[tuple[State, State]], settings: PlannerSettings) -> list[Row]:
     """Compare `surest` with a value iteration of its own."""
-    if settings.hands_at_once:
-        return [Row("plans of surest: not checked while hands_at_once is true", None, "share")]
     rows = []
     for method in settings.methods:
         model, planner = ChanceModel(texts, settings, method), Planner("surest", method, settings)
@@ -181,30 +178,33 @@ def _checked_chances(texts: list[str], pairs: list[tuple[State, State]], setting
 def _times(graph: networkx.Graph, pairs: list[tuple[State, State]], fewest: Planner) -> list[Row]:
     """Time queries beside NetworkX's Dijkstra on the same graph, and loading in fresh processes.
 
-    They take turns of twenty: one by one, each would also pay for the other's traces in the processor's caches.
+    Queries are in processor time, so that other programs do not count. They take turns of twenty: one by one, each would
+    also pay for the other's traces in the processor's caches.
     """
     ours, theirs = [], []
-    turns = [pairs[first:first + _TURN] for first in range(0, len(pairs), _TURN)]
+    turns = [pairs[first:first + _TURN] for first in range(0, len(pairs), _TURN)] * _ROUNDS
     for turn in progress(turns, len(turns), "query times"):
         theirs += [_seconds(lambda: networkx.dijkstra_path(graph, str(start), str(goal))) for start, goal in turn]
         ours += [_seconds(lambda: fewest.plan(start, goal)) for start, goal in turn]
-    ratio = float(np.median(theirs) / np.median(ours))
+    median, slowest = (float(np.quantile(theirs, share) / np.quantile(ours, share)) for share in (0.5, 0.99))
+    goal = f">= {SPEED_UP:g}"
     loads = np.array([_load_times("fewest") for _ in range(_LOADS)])
     return [
         Row("query of fewest, median", float(np.median(ours)) * 1e6, "us", len(ours)),
         Row("query of fewest, 99th percentile", float(np.quantile(ours, 0.99)) * 1e6, "us", len(ours)),
         Row("NetworkX Dijkstra, median", float(np.median(theirs)) * 1e6, "us", len(theirs)),
         Row("NetworkX Dijkstra, 99th percentile", float(np.quantile(theirs, 0.99)) * 1e6, "us", len(theirs)),
-        Row("times faster than NetworkX, medians", ratio, "ratio", len(ours), goal=f">= {SPEED_UP:g}", ok=ratio >= SPEED_UP),
+        Row("times faster than NetworkX, medians", median, "ratio", len(ours), goal=goal, ok=median >= SPEED_UP),
+        Row("times faster than NetworkX, 99th percentiles", slowest, "ratio", len(ours), goal=goal, ok=slowest >= SPEED_UP),
         Row("loading a strategy's table in a fresh process, median", float(np.median(loads[:, 1])), "s", _LOADS),
         Row("importing the planner, median", float(np.median(loads[:, 0])), "s", _LOADS),
     ]
 
 
 def _seconds(call: Callable[[], object]) -> float:
-    began = time.perf_counter()
+    began = time.process_time()
     call()
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 def _load_times(strategy: str) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -66,15 +67,22 @@ class Hands(NamedTuple):
 
 @dataclass(frozen=True)
 class Costs:
-    """Price of single actions: pours by count, all else by `durations`; without them a pick or place is 1, all else 0."""
+    """Price of single actions: pours by count, all else by `durations`; without them a pick or place is 1, all else 0.
+
+    `method` is how balls are poured, by which `durations` tells some. With `at_once` both hands may also pick, or place,
+    together, which takes as long as the slower one does.
+    """
 
     pours: dict[int, float]
     durations: Optional[Durations] = None
+    method: str = ""
+    at_once: bool = False
 
     @classmethod
     def seconds(cls, settings: PlannerSettings, method: str) -> Costs:
         """Return costs in seconds."""
-        return cls({count: pour.seconds for count, pour in settings.durations.pour[method].items()}, settings.durations)
+        pours = {count: pour.seconds for count, pour in settings.durations.pour[method].items()}
+        return cls(pours, settings.durations, method, settings.hands_at_once)
 
     @classmethod
     def balls(cls) -> Costs:
@@ -83,24 +91,37 @@ class Costs:
 
     def ready(self, source: int) -> float:
         """Return the price of bringing the tubes together for a pour out of one of them."""
-        return self.durations.ready[NAMES[source]].seconds if self.durations else 0.0
+        return self.durations.ready[self.method][NAMES[source]].seconds if self.durations else 0.0
 
     def handling(self, hands: Hands, reach: dict[str, tuple[str, ...]]) -> Iterator[tuple[Hands, float]]:
-        """Yield what one pick, one place or raising both tubes after a pour makes of the hands, and its price."""
+        """Yield what one pick, one place or raising both tubes after a pour makes of the hands, and its price.
+
+        With `at_once`, also what two picks or two places make of them.
+        """
         if hands.poured is not None:
-            yield hands._replace(poured=None), self.durations.upright.seconds if self.durations else 0.0
+            yield hands._replace(poured=None), self.durations.upright[self.method].seconds if self.durations else 0.0
             return
-        for hand, name in enumerate(("left", "right")):
-            if hands.held[hand] is not None:
-                seconds = self.durations.place[name][NAMES[hands.held[hand]]].seconds if self.durations else 1.0
-                yield hands._replace(held=_with(hands.held, hand, None)), seconds
-                continue
-            for tube in (tube for tube in range(3) if NAMES[tube] in reach[name] and tube not in hands.held):
-                seconds = 1.0
-                if self.durations:
-                    pick = self.durations.pick
-                    seconds = (pick.after_place if hands.moved[hand] else pick.from_home)[name][NAMES[tube]].seconds
-                yield Hands(_with(hands.held, hand, tube), None, _with(hands.moved, hand, True)), seconds
+        one = [list(self._of_hand(hands, hand, reach[name])) for hand, name in enumerate(("left", "right"))]
+        yield from one[0] + one[1]
+        if self.at_once and (hands.held[0] is None) == (hands.held[1] is None):
+            for (after_left, left), (after_right, right) in product(*one):
+                held = (after_left.held[0], after_right.held[1])
+                if held[0] != held[1] or held[0] is None:
+                    yield Hands(held, None, (after_left.moved[0], after_right.moved[1])), max(left, right)
+
+    def _of_hand(self, hands: Hands, hand: int, reach: tuple[str, ...]) -> Iterator[tuple[Hands, float]]:
+        """Yield what a pick or a place of one hand (0 left, 1 right) makes of the hands, and its price."""
+        name = ("left", "right")[hand]
+        if hands.held[hand] is not None:
+            seconds = self.durations.place[name][NAMES[hands.held[hand]]].seconds if self.durations else 1.0
+            yield hands._replace(held=_with(hands.held, hand, None)), seconds
+            return
+        for tube in (tube for tube in range(3) if NAMES[tube] in reach and tube not in hands.held):
+            seconds = 1.0
+            if self.durations:
+                pick = self.durations.pick
+                seconds = (pick.after_place if hands.moved[hand] else pick.from_home)[name][NAMES[tube]].seconds
+            yield Hands(_with(hands.held, hand, tube), None, _with(hands.moved, hand, True)), seconds
 
     def pour(self, hands: Hands, move: Move) -> Optional[float]:
         """Return the price of a pour with the hands as they are, None when it cannot follow."""

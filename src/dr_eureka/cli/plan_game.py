@@ -3,10 +3,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from itertools import accumulate
 from typing import Any, Optional
 
 from dr_eureka.errors import DrEurekaError
@@ -28,17 +28,12 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     except DrEurekaError as error:
         print(f"plan_game: {error}", file=sys.stderr)
         return 2
-    text = json.dumps(plan_as_mapping(plan, planner)) if arguments.json else "\n".join(plan_as_lines(plan, planner))
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        # `head` and the like stop reading when they have enough; what is left unwritten is not to be tried again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    print(json.dumps(plan_as_mapping(plan, planner)) if arguments.json else "\n".join(plan_as_lines(plan, planner)))
     return 0
 
 
 def plan_as_mapping(plan: Plan, planner: Planner) -> dict[str, Any]:
-    """Return a plan in the shape of `--json`, actions without their unused fields.
+    """Return a plan in the shape of `--json`: `states` are those after each pour, actions are without their unused fields.
 
     `surest` adds the chance to reach the goal, and `otherwise`: for each pour the other ways in which it may end, each
     with its share, the state (null: a ball is lost) and what to pour then.
@@ -47,10 +42,12 @@ def plan_as_mapping(plan: Plan, planner: Planner) -> dict[str, Any]:
         "start": str(plan.start),
         "goal": str(plan.goal),
         "strategy": plan.strategy,
+        "pour": planner.method,
         "cost": int(plan.cost) if plan.strategy == "fewest" else round(plan.cost, 3),
         "unit": _UNITS[plan.strategy],
         "seconds": round(plan.seconds, 3),
         "pours": [asdict(pour) for pour in plan.pours],
+        "states": [str(state) for state in accumulate(plan.pours, State.after, initial=plan.start)][1:],
         "actions": [{k: v for k, v in asdict(action).items() if v} for action in actions_for(plan.pours, planner.reach)],
     }
     if plan.chance is not None:
@@ -87,11 +84,8 @@ def plan_as_lines(plan: Plan, planner: Planner) -> Iterator[str]:
 
 def _otherwise(plan: Plan, planner: Planner) -> list[tuple[Result, ...]]:
     """Return for each pour of a plan the other ways in which it may end."""
-    results, state = [], plan.start
-    for pour in plan.pours:
-        results.append(planner.results_of(pour, state, plan.goal))
-        state = state.after(pour)
-    return results
+    states = accumulate(plan.pours, State.after, initial=plan.start)
+    return [planner.results_of(pour, state, plan.goal) for pour, state in zip(plan.pours, states)]
 
 
 def _result_as_mapping(result: Result) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Optional
 
+from dr_eureka.cli.entry import run
 from dr_eureka.cli.launching import LaunchArgumentError, output_folder, read_arguments, run_launch
 from dr_eureka.cli.verdict import report_replay
 
@@ -39,4 +40,4 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

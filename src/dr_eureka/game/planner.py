@@ -1,7 +1,7 @@
 """Plans: which pours lead from a state to a goal, best by one of three strategies (paper, section 3.3)."""
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Optional
@@ -19,8 +19,7 @@ from dr_eureka.game.tables import cache_folder, load_or_make, table_key
 STRATEGIES = ("fewest", "fastest", "surest")
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """Pours from a state to a goal, none where they are alike.
 
     Attributes:
@@ -73,13 +72,20 @@ class Planner:
         _expect("strategy", strategy, STRATEGIES)
         _expect("way to pour", method, self._settings.methods)
         self.strategy = strategy
-        self._method = method
+        self.method = method
         self.reach: Reach = self._settings.reach
-        self._seconds = pricing.duration_prices(self._settings, method)
+        seconds = pricing.duration_prices(self._settings, method)
+        self._seconds = pricing.Bill(seconds)
         self._graph = state_graph()
-        prices = pricing.fewest_prices(self.reach) if strategy == "fewest" else self._seconds
+        prices = pricing.fewest_prices(self.reach) if strategy == "fewest" else seconds
         shares = pricing.outcome_shares(self._settings, method) if strategy == "surest" else None
         self._solution = _solution(self._graph, prices, shares, cache or cache_folder())
+        # Bytes and memory views give single values many times faster than arrays do.
+        self._plans, self._longest = self._solution.plan.tobytes(), self._solution.plan.shape[-1]
+        graph = self._graph
+        self._goal_class, self._recolouring, self._recoloured = map(
+            memoryview, (graph.goal_class, graph.recolouring, graph.recoloured)
+        )
 
     def plan(self, start: State, goal: State) -> Plan:
         """Return the best plan if every pour does what it should; where one does not, plan again from what resulted.
@@ -94,28 +100,23 @@ class Planner:
             cost = self._solution.cost[self._look_up(start, goal)]
         if self._solution.chance is not None:
             chance = float(self._solution.chance[self._look_up(start, goal)])
-        seconds = pricing.price_of(numbers, self._seconds)
-        return Plan(start, goal, self.strategy, tuple(POURS[number] for number in numbers), float(cost), seconds, chance)
+        pours = tuple(map(POURS.__getitem__, numbers))
+        return Plan(start, goal, self.strategy, pours, float(cost), self._seconds.total(numbers), chance)
 
     def pours(self, start: State, goal: State) -> tuple[Pour, ...]:
         """Return the pours of the best plan alone; raises what `plan` does."""
-        return tuple(POURS[number] for number in self._numbers(start, goal))
+        return tuple(map(POURS.__getitem__, self._numbers(start, goal)))
 
-    def _numbers(self, start: State, goal: State) -> list[int]:
+    def _numbers(self, start: State, goal: State) -> bytes:
         """Return the pours of the best plan by their numbers in `POURS`."""
         goal_class, state = self._look_up(start, goal)
-        if self._solution.cost.item(goal_class, state) >= solving.UNREACHABLE:
+        first = (goal_class * len(self._graph.states) + state) * self._longest
+        end = self._plans.find(NO_POUR, first, first + self._longest)
+        if end < 0:
+            raise PlannerError(f"{start} to {goal}: the {self.strategy} way counts on pours that go wrong")
+        if end == first and start != goal:
             raise ReachError(f"{start} to {goal}", self.reach)
-        next_pour, after = self._solution.pour[goal_class], self._graph.after
-        numbers: list[int] = []
-        held = 0
-        while (pour := next_pour.item(held, state)) != NO_POUR:
-            numbers.append(pour)
-            direction, fewer = divmod(pour, TUBE_CAPACITY)
-            state, held = after.item(direction, fewer + 1, state), direction + 1
-            if len(numbers) > len(POURS) * TUBE_CAPACITY:
-                raise PlannerError(f"{start} to {goal}: the {self.strategy} way counts on pours that go wrong")
-        return numbers
+        return self._plans[first:end]
 
     def next_pour(self, state: State, goal: State, last: Optional[Pour] = None) -> Optional[Pour]:
         """Return what to pour next, None at the goal, from whatever state has resulted.
@@ -139,7 +140,7 @@ class Planner:
             PourError: for a pour that the state does not allow.
         """
         state.after(pour)
-        outcome = self._settings.outcomes[self._method][len(state.tube(pour.source))][pour.count]
+        outcome = self._settings.outcomes[self.method][len(state.tube(pour.source))][pour.count]
         fewer = state if pour.count == 1 else state.after(replace(pour, count=pour.count - 1))
         shares, lost = {fewer: outcome.fewer}, outcome.lost
         if len(state.tube(pour.target)) + pour.count < TUBE_CAPACITY and outcome.more:
@@ -152,10 +153,9 @@ class Planner:
 
     def _look_up(self, state: State, goal: State) -> tuple[int, int]:
         """Return by which class and state the tables know a goal and a state, colours swapped as in the class's goal."""
-        graph = self._graph
-        goal_number = graph.numbers[goal]
-        swap = graph.recolouring.item(goal_number)
-        return graph.goal_class.item(goal_number), graph.recoloured.item(swap, graph.numbers[state])
+        goal_number = self._graph.numbers[goal.tubes]
+        swap = self._recolouring[goal_number]
+        return self._goal_class[goal_number], self._recoloured[swap, self._graph.numbers[state.tubes]]
 
 
 def plan_pours(start: State, goal: State) -> tuple[Pour, ...]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import fsum
+from typing import Any
 
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.hands import HANDS
@@ -41,13 +42,13 @@ class Durations:
     """Everything a plan is made of.
 
     `ready` brings two tubes together for pours out of the one named, `upright` back to where they can be placed, `home`
-    both hands back after the last place; `pour` is by way to pour and balls.
+    both hands back after the last place. `ready`, `upright` and `pour` are by way to pour, `pour` then by balls.
     """
 
     pick: PickDurations
     place: dict[str, dict[str, Measured]]
-    ready: dict[str, Measured]
-    upright: Measured
+    ready: dict[str, dict[str, Measured]]
+    upright: dict[str, Measured]
     home: Measured
     pour: dict[str, dict[int, Measured]]
 
@@ -81,7 +82,12 @@ class PlannerSettings:
 @lru_cache(maxsize=4)
 def load_planner_settings(path: str = PLANNER_FILE) -> PlannerSettings:
     """Load and check the planner's settings; raises ResourceError or SettingsError naming the file and the key."""
-    settings = build(PlannerSettings, load_yaml(path), path)
+    return planner_settings(load_yaml(path), path)
+
+
+def planner_settings(content: Any, path: str) -> PlannerSettings:
+    """Check the content of the yaml at `path`; raises SettingsError naming that and the key."""
+    settings = build(PlannerSettings, content, path)
     _expect_keys(path, "reach", settings.reach, HANDS)
     durations = settings.durations
     for key, table in (
@@ -92,11 +98,16 @@ def load_planner_settings(path: str = PLANNER_FILE) -> PlannerSettings:
         _expect_keys(path, key, table, HANDS)
         for hand, tubes in settings.reach.items():
             _expect_keys(path, f"{key}.{hand}", table[hand], tubes, TUBES)
-    _expect_keys(path, "durations.ready", durations.ready, TUBES)
     counts = range(1, TUBE_CAPACITY + 1)
-    _expect_keys(path, "outcomes", settings.outcomes, settings.methods)
+    for key, table in (
+        ("durations.ready", durations.ready),
+        ("durations.upright", durations.upright),
+        ("outcomes", settings.outcomes),
+    ):
+        _expect_keys(path, key, table, settings.methods)
     for method, by_count in durations.pour.items():
         _expect_keys(path, f"durations.pour.{method}", by_count, counts)
+        _expect_keys(path, f"durations.ready.{method}", durations.ready[method], TUBES)
         for count, pour in by_count.items():
             if pour.seconds == 0.0:
                 key = f"durations.pour.{method}.{count}.seconds"

@@ -1,7 +1,7 @@
 """Settings turned into what the solver makes least: balls and handling, or seconds; and into shares of outcomes."""
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Optional
 
@@ -35,10 +35,10 @@ def duration_prices(settings: PlannerSettings, method: str) -> Prices:
     prices = _prices(
         [_grip(direction, settings.reach) for direction in DIRECTIONS],
         handling,
-        lambda before, after: durations.upright.seconds + (handling(before, after) if before != after else 0.0),
+        lambda before, after: durations.upright[method].seconds + (handling(before, after) if before != after else 0.0),
         np.array([durations.pour[method][count].seconds for count in range(1, TUBE_CAPACITY + 1)]),
     )
-    ready = np.array([durations.ready[source].seconds for source, _ in DIRECTIONS])
+    ready = np.array([durations.ready[method][source].seconds for source, _ in DIRECTIONS])
     return replace(prices, begin=prices.begin + ready, change=prices.change + ready * ~np.eye(len(DIRECTIONS), dtype=bool))
 
 
@@ -52,15 +52,25 @@ def outcome_shares(settings: PlannerSettings, method: str) -> Shares:
     return Shares(intended, fewer, more)
 
 
-def price_of(pours: Iterable[int], prices: Prices) -> float:
-    """Return what pours, by their numbers, cost in a row that begins and ends with empty hands; nothing for none."""
-    total, last = 0.0, None
-    for pour in pours:
-        direction, fewer = divmod(pour, TUBE_CAPACITY)
-        total += prices.begin.item(direction) if last is None else prices.change.item(last, direction)
-        total += prices.pour.item(fewer)
-        last = direction
-    return total if last is None else total + prices.finish.item(last)
+class Bill:
+    """Adds up what pours cost, from lists: single values of an array take many times as long to look up."""
+
+    def __init__(self, prices: Prices) -> None:
+        # By number of pour (24) instead of direction (6), the pour's own price included.
+        first, following = (
+            (handling[..., None] + prices.pour).reshape(*handling.shape[:-1], -1) for handling in (prices.begin, prices.change)
+        )
+        self._first = first.tolist()
+        self._next = np.repeat(following, TUBE_CAPACITY, axis=0).tolist()
+        self._finish = np.repeat(prices.finish, TUBE_CAPACITY).tolist()
+
+    def total(self, pours: Sequence[int]) -> float:
+        """Return what pours, by their numbers, cost in a row that begins and ends with empty hands; nothing for none."""
+        total, price = 0.0, self._first
+        for pour in pours:
+            total += price[pour]
+            price = self._next[pour]
+        return total + self._finish[pours[-1]] if pours else 0.0
 
 
 def _grip(direction: tuple[str, str], reach: Reach) -> Optional[Grip]:
@@ -94,17 +104,14 @@ def _prices(
 def _handling_seconds(before: Grip, after: Grip, durations: Durations, at_once: bool) -> float:
     """Return how long picks and places take from one grip to another, tubes being upright.
 
-    With both hands at once each places and then picks on its own; it waits for a tube that the other has yet to place.
+    At once, both hands place together and, when both have, pick together.
     """
-    hands = tuple(zip(HANDS, before, after))
-    placing = {hand: _seconds(durations.place, hand, old) if old != new else 0.0 for hand, old, new in hands}
-    ends = []
-    for hand, old, new in hands:
-        picks = durations.pick.from_home if old is None else durations.pick.after_place
-        picking = _seconds(picks, hand, new) if old != new else 0.0
-        free = max(placing.values()) if new in before and old != new else placing[hand]
-        ends.append(free + picking if at_once else placing[hand] + picking)
-    return max(ends) if at_once else sum(ends)
+    changed = [(hand, old, new) for hand, old, new in zip(HANDS, before, after) if old != new]
+    placing = [_seconds(durations.place, hand, old) for hand, old, _ in changed]
+    picking = [
+        _seconds(durations.pick.from_home if old is None else durations.pick.after_place, hand, new) for hand, old, new in changed
+    ]
+    return max(placing, default=0.0) + max(picking, default=0.0) if at_once else sum(placing) + sum(picking)
 
 
 def _seconds(table: dict[str, dict[str, Measured]], hand: str, tube: Optional[str]) -> float:

@@ -23,6 +23,8 @@ NO_POUR = 255
 _TOLERANCE = 1e-10
 # Two pours are equally sure when their chances differ by no more: ten times what iteration leaves open.
 _EQUAL_CHANCE = 1e-9
+# A plan that has not ended after so many pours never will: the puzzle's diameter is 14.
+_MOST_POURS = 96
 # Goals solved together: so many that the arrays of one step still lie in a processor's cache.
 _GOALS_AT_ONCE = 15
 
@@ -67,11 +69,14 @@ class Solution:
 
     Attributes:
         pour: (classes, 7, s) uint8, number of the pour to make, by what is held; `NO_POUR` for none.
+        plan: (classes, s, longest) uint8, all pours from empty hands if each does what it should, then `NO_POUR`; without
+            `NO_POUR` where they would never end.
         cost: (classes, s), expected price from empty hands to the goal and empty hands.
         chance: (classes, s), of reaching the goal; None where outcomes are certain.
     """
 
     pour: np.ndarray
+    plan: np.ndarray
     cost: np.ndarray
     chance: Optional[np.ndarray]
 
@@ -89,11 +94,10 @@ def solve(graph: StateGraph, prices: Prices, shares: Optional[Shares] = None) ->
         _solve_goals(goals[first : first + _GOALS_AT_ONCE], prices, certain, uncertain)
         for first in range(0, len(goals), _GOALS_AT_ONCE)
     ]
-    # What is known of one goal lies together: a plan is looked up in a few kilobytes.
     pour, cost, chance = (
         None if part[0] is None else np.concatenate([np.moveaxis(array, -1, 0) for array in part]) for part in zip(*parts)
     )
-    return Solution(pour, cost, chance)
+    return Solution(pour, _followed(graph, pour), cost, chance)
 
 
 def _solve_goals(
@@ -115,6 +119,23 @@ def _solve_goals(
     from_empty_hands = np.minimum(by_held[0].min(axis=0), UNREACHABLE)
     from_empty_hands[at_goal] = 0.0
     return pour, from_empty_hands, chance
+
+
+def _followed(graph: StateGraph, pour: np.ndarray) -> np.ndarray:
+    """Return `Solution.plan` by following the pours (classes, 7, s) from every state at once."""
+    goal_class = np.arange(len(pour))[:, None]
+    state = np.tile(np.arange(pour.shape[-1]), (len(pour), 1))
+    held = np.zeros_like(state)
+    steps: list[np.ndarray] = []
+    while len(steps) < _MOST_POURS:
+        steps.append(pour[goal_class, held, state])
+        going = steps[-1] != NO_POUR
+        if not going.any():
+            break
+        direction, fewer = np.divmod(steps[-1][going], TUBE_CAPACITY)
+        state[going] = graph.after[direction, fewer + 1, state[going]]
+        held[going] = direction + 1
+    return np.stack(steps, axis=-1)
 
 
 class _Outcomes:

@@ -27,6 +27,7 @@ from dr_eureka.nodes.runner import run_node
 from dr_eureka.nodes.sight import TRANSPORTS, Sight, SightSettings
 from dr_eureka.pieces import load_pieces
 from dr_eureka.settings import build
+from dr_eureka.vision.camera import load_camera
 from dr_eureka.vision.cards import CardReader, CardSettings
 from dr_eureka.vision.contents import ContentsReading, ContentsSettings, read_contents
 from dr_eureka.vision.tubes import TubeScene, TubeSettings, locate_tubes
@@ -78,6 +79,7 @@ class DrEurekaMain:
         * **~confirm_card** (bool): wait after each card, before any motion of the arms, until a person confirms or corrects it
         * **~strategy** (str): fewest, fastest or surest; **~pour** (str): lock or direct
         * **~image_transport** (str): raw or compressed
+        * **~camera_calibration** (str): file that calibrate_camera wrote, used instead of camera/camera_info; or `none`
         * **~replay** (bool): command nothing, look at recorded images; **~bag** (str): the recording, checked first
         * **~stay** (bool): go on publishing the result when all games are over
         * node, flow, votes, cards, tubes, contents: see config/dr_eureka_main.yaml
@@ -145,11 +147,13 @@ def _serve() -> int:
     strategy = take_choice(parameters, "strategy", STRATEGIES)
     confirm_card = take_choice(parameters, "confirm_card", (False, True))
     replay, stay = take_choice(parameters, "replay", (False, True)), take_choice(parameters, "stay", (False, True))
+    calibration = str(take(parameters, "camera_calibration"))
     bag = str(parameters.pop("bag", ""))
     refuse_rest(parameters)
     if replay:
         check_bag(resolve(bag), transport)
 
+    camera = None if calibration == "none" else load_camera(resolve(calibration))
     reader, pieces = CardReader.load(card_settings), load_pieces()
 
     def locate(frame: Frame) -> TubeScene:
@@ -169,8 +173,7 @@ def _serve() -> int:
         flow_settings,
         goal=goal,
         games=games,
-        plan=Planner(strategy, pour).pours,
-        pour=pour,
+        planner=Planner(strategy, pour),
         looks=Looks(
             card=lambda: CardLook(reader.read, CardVote(votes.card), announcer.on_card_reading),
             tubes=lambda: TubeLook(
@@ -190,7 +193,7 @@ def _serve() -> int:
         backlog=settings.replay_backlog if replay else 1,
         history=settings.replay_history if replay else settings.history,
     )
-    code = DrEurekaMain(flow, Sight(sight_settings, transport), engine, announcer, settings).play()
+    code = DrEurekaMain(flow, Sight(sight_settings, transport, camera), engine, announcer, settings).play()
     if stay:
         rospy.spin()
     else:

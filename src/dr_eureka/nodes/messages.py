@@ -185,6 +185,8 @@ def report_to_message(report: GameReport, now_s: float) -> msg.GameStatus:
         start=report.start,
         card=report.card,
         goal=report.goal,
+        strategy=report.strategy,
+        pour=report.pour,
         pours=[pour_to_message(pour) for pour in report.pours],
         actions=[
             msg.ActionRecord(
@@ -214,6 +216,8 @@ def report_from_message(status: msg.GameStatus) -> GameReport:
         start=status.start,
         card=status.card,
         goal=status.goal,
+        strategy=status.strategy,
+        pour=status.pour,
         pours=pours_from_messages(status.pours),
         actions=tuple(
             ActionRecord(action_from_message(record.action), record.start.to_sec() - began_s, record.end.to_sec() - began_s)
