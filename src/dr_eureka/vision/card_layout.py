@@ -28,7 +28,6 @@ _FOOT_TOLERANCE = 0.45  # [ball diameters] in height
 _FOOT_ASIDE = 0.3  # [tube spacings] of a foot from its tube's axis
 _NARROWEST_SPACING = 1.1  # [ball diameters]
 _UNEQUAL_SPACING = 1.5  # most that the wider of two gaps between tubes may exceed the narrower
-_OFF_CENTRE = 0.17  # [tube spacings] most that a card's tubes as a whole stand beside its middle
 
 
 class LayoutError(DrEurekaError):
@@ -162,8 +161,8 @@ def _feet_fit(axes: Sequence[float], feet: Sequence[SeenFoot]) -> bool:
 def _empty_tube(axes: Sequence[float], feet: Sequence[SeenFoot], diameter: float) -> int:
     """Return which tube, 0 to 2, is empty when the balls stand in the two others.
 
-    Each of the three cases says where all tubes stand. The foot of the empty one decides; failing that, a card's tubes
-    are drawn about its middle. Raises LayoutError when no case fits, or when neither foot nor middle decides.
+    Each of the three cases says where all tubes stand; the foot of the empty one decides. Without it nothing does: a card
+    of which a tube is cut off or covered would be read as another. Raises LayoutError when no case fits, or several.
     """
     first, second = axes
     apart = second - first
@@ -173,19 +172,13 @@ def _empty_tube(axes: Sequence[float], feet: Sequence[SeenFoot], diameter: float
         2: (first, second, second + apart),
     }
     spacing = {0: apart, 1: apart / 2, 2: apart}
-    possible = [
+    seen = [
         empty for empty, tubes in cases.items()
         if spacing[empty] >= _NARROWEST_SPACING * diameter
         and 0.0 < tubes[0] - diameter / 2 and tubes[2] + diameter / 2 < 1.0
         and _feet_fit(tubes, feet)
+        and any(abs(foot.x - tubes[empty]) <= _FOOT_ASIDE * spacing[empty] for foot in feet)
     ]
-    seen = [
-        empty for empty in possible
-        if any(abs(foot.x - cases[empty][empty]) <= _FOOT_ASIDE * spacing[empty] for foot in feet)
-    ]
-    if len(seen) == 1:
-        return seen[0]
-    central = [e for e in possible if abs(cases[e][1] - 0.5) <= _OFF_CENTRE * spacing[e]]
-    if not seen and len(central) == 1:
-        return central[0]
-    raise LayoutError("which tube is empty cannot be told")
+    if len(seen) != 1:
+        raise LayoutError("which tube is empty cannot be told")
+    return seen[0]
