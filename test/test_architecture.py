@@ -16,27 +16,30 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "dr_eureka"
 
-FOUNDATION = {"errors", "memory", "pieces", "resources", "settings"}
+FOUNDATION = {"checkpoint", "errors", "memory", "pieces", "resources", "settings"}
 # Room: the other rooms, or single modules of them, that it may import besides the foundation.
 ALLOWED = {
     "game": set(),
     "kinematics": set(),
     "vision": {"game"},
     "control": {"game", "kinematics"},
+    "catching": {"kinematics", "vision.camera"},
     # The simulator prints the sheet and the card with the same pictures that the robot's vision knows.
-    "simulation": {"game", "kinematics", "vision.aruco", "vision.camera", "vision.card_renderer", "vision.sheet_renderer"},
+    "simulation": {
+        "game", "kinematics", "catching", "vision.aruco", "vision.camera", "vision.card_renderer", "vision.sheet_renderer",
+    },
     "printing": {"vision"},
     "behaviour": {"game", "vision", "control"},
     "bags": {"game", "kinematics", "vision", "behaviour"},
-    "bench": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
-    "cli": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags", "bench", "printing"},
-    "nodes": {"game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
+    "bench": {"catching", "game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
+    "cli": {"catching", "game", "kinematics", "vision", "control", "simulation", "behaviour", "bags", "bench", "printing"},
+    "nodes": {"catching", "game", "kinematics", "vision", "control", "simulation", "behaviour", "bags"},
 }
 ROS_MODULES = {"cv_bridge", "genpy", "rosbag", "rosgraph", "roslaunch", "roslib", "rospy", "rostest", "std_srvs", "tf2_ros"}
 # Packages that are needed without being imported: generated messages, and what launch files and commands start.
 STARTED = {"message_runtime", "robot_state_publisher", "roslaunch"}
-DEBIAN_PYTHON = {"cv2": "python3-opencv"}
-ONLY_ON_PYPI = {"pybullet", "pybullet_utils", "rosbags", "ruamel"}
+DEBIAN_PYTHON = {"cv2": "python3-opencv", "PyKDL": "python3-pykdl"}
+ONLY_ON_PYPI = {"pybullet", "pybullet_utils", "rosbags", "ruamel", "ruckig"}
 ROS_OF_OURS = {"dr_eureka.msg", "dr_eureka.srv"}
 
 MODULES = {
@@ -118,7 +121,7 @@ def test_a_room_imports_only_what_the_table_allows(room):
 
 def test_what_decides_never_sees_the_simulator():
     """Follow imports as far as they lead: not even through a third module may the robot know the simulator."""
-    for room in ("game", "vision", "kinematics", "control", "behaviour"):
+    for room in ("game", "vision", "kinematics", "control", "catching", "behaviour"):
         reached, waiting = set(), [module for module in MODULES if module.startswith(f"dr_eureka.{room}")]
         while waiting:
             module = waiting.pop()

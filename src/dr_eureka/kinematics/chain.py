@@ -35,9 +35,9 @@ class Chain:
     ) -> None:
         """Precompute the constant parts.
 
-        joint_names: n names. axes: (n, 3) unit, in the joint's frame. origins: (n, 4, 4) from the previous joint's frame (root
-        for the first) to the joint's. tip: (4, 4) last joint's frame from tip. limits: (n, 3) lower, upper [rad], speed
-        [rad/s]. links: link name -> (number of joints before it, (4, 4) that joint's frame from the link).
+        joint_names: n names. axes: (n, 3) unit, in the joint's frame. origins: (n, 4, 4) from the previous joint's frame
+        (root for the first) to the joint's. tip: (4, 4) last joint's frame from tip. limits: (n, 3) lower, upper [rad],
+        speed [rad/s]. links: link name -> (number of joints before it, (4, 4) that joint's frame from the link).
         """
         self.joint_names = tuple(joint_names)
         self.lower, self.upper, self.velocity = (np.array(column) for column in np.asarray(limits, dtype=float).T)
@@ -61,8 +61,8 @@ class Chain:
     def from_urdf(cls, source: str | Path, root: str, tip: str, held: Mapping[str, float] | None = None) -> "Chain":
         """Read the chain from `root` to `tip` out of a URDF file or text.
 
-        held: joints kept at a fixed angle [rad] and so not part of the chain. Raises ChainError for unreadable XML, an unknown
-        link, a tip that does not hang from the root, or a joint that is neither fixed, revolute nor continuous.
+        held: joints kept at a fixed angle [rad] and so not part of the chain. Raises ChainError for unreadable XML, an
+        unknown link, a tip that does not hang from the root, or a joint that is neither fixed, revolute nor continuous.
         """
         held = dict(held or {})
         path = _joints_between(_parse(source), root, tip)
@@ -131,7 +131,9 @@ class Chain:
     def forward_all(self, joints: np.ndarray) -> dict[str, np.ndarray]:
         """Return root_from_link (4, 4) of every link between root and tip, by name, for joints (n,) [rad]."""
         frames = self._joint_frames(self._checked(joints))
-        return {name: frames[count - 1] @ offset if count else offset.copy() for name, (count, offset) in self._links.items()}
+        return {
+            name: frames[count - 1] @ offset if count else offset.copy() for name, (count, offset) in self._links.items()
+        }
 
     def jacobian(self, joints: np.ndarray) -> np.ndarray:
         """Return the geometric Jacobian (..., 6, n) of the tip: rows linear [m/rad] then angular, both in the root frame."""
@@ -151,7 +153,12 @@ class Chain:
         rotation, position = self._tip_of_batch(rotations, origins)
         axes = np.einsum("kijn,kj->ikn", rotations, self._axes)
         jacobians = _jacobian(axes, (position - origins).transpose(1, 0, 2))
-        return _stack(rotation, position).reshape(shape + (4, 4)), jacobians.transpose(2, 0, 1).reshape(shape + (6, len(self)))
+        poses = _stack(rotation, position).reshape(shape + (4, 4))
+        return poses, jacobians.transpose(2, 0, 1).reshape(shape + (6, len(self)))
+
+    def geometry(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return axes (n, 3) in their joint's frame, previous_joint_from_joint (n, 4, 4) at zero, last_joint_from_tip."""
+        return self._axes.copy(), self._origins.copy(), self._tip.copy()
 
     def local_parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return constant, sine and cosine parts (n, 4, 4) of the local transforms, and last_joint_from_tip (4, 4)."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field
-from typing import Iterator, Sequence
+from typing import Iterator, NamedTuple, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from dr_eureka.kinematics.arms import side_of
 from dr_eureka.kinematics.chain import Chain
 from dr_eureka.kinematics.hybrid_settings import HybridSettings
 from dr_eureka.kinematics.ik_result import IkCode, IkResult
+from dr_eureka.kinematics.jacobian_step import JacobianStep
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.kinematics.transforms import rotation_vector
 
@@ -25,6 +26,7 @@ __all__ = ["HybridSettings", "HybridSolver", "IkCode", "IkResult"]
 _RESTART_SEED = 2020  # restarts are drawn afresh, but alike, in each solve: equal questions get equal answers
 _FADE_DISTANCE = 0.05  # [m] nearer than this the pull to the rest posture fades, so that it cannot delay the last millimetre
 _SETTLED = 1e-3  # [rad] a posture that moves less than this in a step has settled
+_CYCLES_UNASKED = 6  # after a refused step: what misled the network here will do so a little farther on
 _PROGRESS = 0.98  # an error below this share of the best one so far counts as progress
 
 
@@ -42,6 +44,17 @@ class _Attempt:
     path: list[np.ndarray] = field(default_factory=list)
 
 
+class _View(NamedTuple):
+    """A posture seen from the target: displacement (3,) [m] and rotation vector (3,) [rad] left to go, in the root frame."""
+
+    jacobian: np.ndarray
+    shift: np.ndarray
+    turn: np.ndarray
+    distance: float
+    angle: float
+    score: float
+
+
 class HybridSolver:
     """Find joint angles that bring a chain's tip to a pose."""
 
@@ -53,15 +66,16 @@ class HybridSolver:
         self._settings = settings
         self._shoulder = chain.first_joint_origin
         self._mid_range = np.where(np.isfinite(chain.lower + chain.upper), 0.5 * (chain.lower + chain.upper), 0.0)
-        self._damping = settings.damping**2 * np.eye(6)
+        self._jacobian_step = JacobianStep(chain, settings).step
 
     def solve(
         self, start_joints: np.ndarray, target: np.ndarray, rest: np.ndarray | None = None, restarts: int | None = None
     ) -> IkResult:
         """Bring the tip to `target` (4, 4), its pose in the chain's root frame, from start_joints (n,) [rad].
 
-        rest: posture (n,) [rad] that the arm's spare freedom is pulled to, by default the middle of the limits. restarts: how
-        many other starts to try when the first fails, by default the setting. Never raises for a bad target or start; the code says it.
+        rest: posture (n,) [rad] that the arm's spare freedom is pulled to, by default the middle of the limits. restarts:
+        how many other starts to try when the first fails, by default the setting. Never raises for a bad target or start;
+        the code says it.
         """
         problem = self._problem_with(start_joints, target)
         if problem is not None:
@@ -95,12 +109,14 @@ class HybridSolver:
         reason = f"{1000.0 * errors[0]:.1f} mm and {errors[1]:.3f} rad left after {cycles} cycles"
         return IkResult(IkCode.NO_CONVERGENCE, best.joints, *errors, cycles, network_cycles, used, path, reason)
 
-    def solve_path(self, start_joints: np.ndarray, targets: Sequence[np.ndarray], rest: np.ndarray | None = None) -> list[IkResult]:
+    def solve_path(
+        self, start_joints: np.ndarray, targets: Sequence[np.ndarray], rest: np.ndarray | None = None
+    ) -> list[IkResult]:
         """Solve neighbouring poses (4, 4) one after another, each from the one before, for a path without jumps.
 
-        rest: as in `solve`, by default start_joints: then equal poses on the way there and back get equal joints. The list ends at
-        the first pose that fails; a solution that turns a joint more than the setting path_joint_step away from the one before is a
-        failure (NO_CONVERGENCE with the reason).
+        rest: as in `solve`, by default start_joints: then equal poses on the way there and back get equal joints. The list
+        ends at the first pose that fails; a solution that turns a joint more than the setting path_joint_step away from the
+        one before is a failure (NO_CONVERGENCE with the reason).
         """
         results: list[IkResult] = []
         joints = np.asarray(start_joints, dtype=float)
@@ -112,9 +128,8 @@ class HybridSolver:
                 largest = int(np.argmax(turns))
                 if turns[largest] > self._settings.path_joint_step:
                     reason = f"{self._chain.joint_names[largest]} would jump by {turns[largest]:.2f} rad"
-                    result = IkResult(
-                        IkCode.NO_CONVERGENCE, joints, result.position_error_m, result.orientation_error_rad, result.cycles, reason=reason
-                    )
+                    errors = result.position_error_m, result.orientation_error_rad
+                    result = IkResult(IkCode.NO_CONVERGENCE, joints, *errors, result.cycles, reason=reason)
             results.append(result)
             if result.code != IkCode.CONVERGED:
                 break
@@ -137,15 +152,17 @@ class HybridSolver:
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0.0:
             return refuse(IkCode.INVALID_TARGET, "target's rotation part is not a rotation matrix")
         if start.shape != (len(self._chain),) or not np.all(np.isfinite(start)):
-            return refuse(IkCode.INVALID_TARGET, f"start of shape {start.shape} is not {len(self._chain)} finite joint angles")
-        if not self._chain.within_limits(start, self._settings.limit_slack):
-            outside = (start < self._chain.lower - self._settings.limit_slack) | (start > self._chain.upper + self._settings.limit_slack)
+            count = len(self._chain)
+            return refuse(IkCode.INVALID_TARGET, f"start of shape {start.shape} is not {count} finite joint angles")
+        slack = self._settings.limit_slack
+        if not self._chain.within_limits(start, slack):
+            outside = (start < self._chain.lower - slack) | (start > self._chain.upper + slack)
             names = ", ".join(name for name, out in zip(self._chain.joint_names, outside) if out)
             return refuse(IkCode.OUT_OF_LIMITS, f"start is outside the limits of {names}")
         distance = float(np.linalg.norm(pose[:3, 3] - self._shoulder))
         if distance > self._settings.reach:
-            short = distance - self._settings.reach
-            return refuse(IkCode.UNREACHABLE, f"target is {short:.3f} m beyond the arm's reach of {self._settings.reach} m", short)
+            reach, short = self._settings.reach, distance - self._settings.reach
+            return refuse(IkCode.UNREACHABLE, f"target is {short:.3f} m beyond the arm's reach of {reach} m", short)
         return None
 
     def _starts(self, start: np.ndarray, rest: np.ndarray, restarts: int) -> Iterator[np.ndarray]:
@@ -160,51 +177,55 @@ class HybridSolver:
             else:
                 yield rng.uniform(np.maximum(self._chain.lower, -np.pi), np.minimum(self._chain.upper, np.pi))
 
-    def _attempt(self, start: np.ndarray, target: np.ndarray, rest: np.ndarray, deadline: float, limited: bool = True) -> _Attempt:
+    def _attempt(
+        self, start: np.ndarray, target: np.ndarray, rest: np.ndarray, deadline: float, limited: bool = True
+    ) -> _Attempt:
         """Step from `start` towards `target` until it is reached, progress stalls, or cycles or time are used up."""
         settings = self._settings
-        joints = start
+        joints, view = start, self._view(start, target)
         attempt = _Attempt(joints)
         walked, best_cycle = [joints], 0
         progress_score, progress_cycle = math.inf, 0
+        ask_from = 0 if limited and self._network is not None else math.inf
         for cycle in range(settings.max_cycles + 1):
-            pose, jacobian = self._chain.forward_and_jacobian(joints)
-            shift, turn = _pose_error(pose, target)
-            distance, angle = math.sqrt(shift @ shift), math.sqrt(turn @ turn)
-            score = distance + settings.rotation_length * angle
-            if score < attempt.score:
-                attempt.joints, attempt.score = joints, score
-                attempt.position_error, attempt.orientation_error = distance, angle
-                best_cycle = cycle
-            if distance <= settings.position_tolerance and angle <= settings.orientation_tolerance:
+            if view.score < attempt.score:
+                attempt.joints, attempt.score, best_cycle = joints, view.score, cycle
+                attempt.position_error, attempt.orientation_error = view.distance, view.angle
+            if view.distance <= settings.position_tolerance and view.angle <= settings.orientation_tolerance:
                 attempt.converged = True
                 break
-            if score < _PROGRESS * progress_score:
-                progress_score, progress_cycle = score, cycle
+            if view.score < _PROGRESS * progress_score:
+                progress_score, progress_cycle = view.score, cycle
             if cycle == settings.max_cycles or cycle - progress_cycle > settings.stall_cycles or time.monotonic() > deadline:
                 break
-            step = None
-            if limited and self._network is not None and distance > settings.network_distance:
-                step = self._network_step(joints, target, shift, turn, distance, score)
-                attempt.network_cycles += step is not None
-            if step is None:
-                pull = settings.rest_gain * min(1.0, score / _FADE_DISTANCE) * (rest - joints)
-                step = self._jacobian_step(joints, jacobian, shift, turn, pull, limited)
-            joints = joints + step
+            learned = None
+            if cycle >= ask_from and view.distance > settings.network_distance:
+                learned = self._network_step(joints, view, target)
+                if learned is None:
+                    ask_from = cycle + _CYCLES_UNASKED
+            if learned is not None:
+                joints, view = learned
+                attempt.network_cycles += 1
+            else:
+                pull = settings.rest_gain * min(1.0, view.score / _FADE_DISTANCE) * (rest - joints)
+                ahead = joints + self._jacobian_step(joints, view.jacobian, view.shift, view.turn, pull, limited)
+                joints = self._chain.clip(ahead) if limited else ahead  # rounding passes a limit that the step stops at
+                view = self._view(joints, target)
             attempt.cycles += 1
             walked.append(joints)
         attempt.path = walked[: best_cycle + 1]
         return attempt
 
     def _settle(self, reached: _Attempt, target: np.ndarray, rest: np.ndarray, deadline: float) -> _Attempt:
-        """Move the arm's spare freedom to the rest posture with the hand held; return `reached` if the hand could not be held."""
+        """Move the arm's spare freedom to the rest posture, the hand held; return `reached` if it could not be held."""
         joints, walked = reached.joints, []
         for _ in range(self._settings.rest_cycles if self._settings.rest_gain > 0.0 else 0):
-            pose, jacobian = self._chain.forward_and_jacobian(joints)
-            step = self._jacobian_step(joints, jacobian, *_pose_error(pose, target), self._settings.rest_gain * (rest - joints))
+            view = self._view(joints, target)
+            pull = self._settings.rest_gain * (rest - joints)
+            step = self._jacobian_step(joints, view.jacobian, view.shift, view.turn, pull)
             if np.abs(step).max() < _SETTLED:
                 break
-            joints = joints + step
+            joints = self._chain.clip(joints + step)
             walked.append(joints)
         if not walked:
             return reached
@@ -216,63 +237,26 @@ class HybridSolver:
         settled.path = reached.path + walked + settled.path[1:]
         return settled
 
-    def _network_step(
-        self, joints: np.ndarray, target: np.ndarray, shift: np.ndarray, turn: np.ndarray, distance: float, score: float
-    ) -> np.ndarray | None:
-        """Return the network's joint step (n,) [rad], or None where it cannot be trusted: limits, a jump, or no nearer."""
+    def _network_step(self, joints: np.ndarray, view: _View, target: np.ndarray) -> tuple[np.ndarray, _View] | None:
+        """Return where the network steps to, or None where it cannot be trusted: limits, a jump, or no nearer."""
         settings = self._settings
-        share = min(1.0, settings.network_step / distance)
-        largest_turn = float(np.abs(turn).max())
-        turn_share = share if share * largest_turn <= settings.network_rotation else settings.network_rotation / largest_turn
-        step = self._network.step(joints, np.concatenate([share * shift, turn_share * turn]), self._side)
-        if not np.all(np.abs(step) <= settings.network_joint_step) or not self._chain.within_limits(joints + step):
+        share = min(1.0, settings.network_step / view.distance)
+        turn_share = min(share, settings.network_rotation / max(float(np.abs(view.turn).max()), 1e-12))
+        step = self._network.step(joints, np.concatenate([share * view.shift, turn_share * view.turn]), self._side)
+        ahead = joints + step
+        if not np.all(np.abs(step) <= settings.network_joint_step) or not self._chain.within_limits(ahead):
             return None
-        shift_left, turn_left = _pose_error(self._chain.forward(joints + step), target)
-        if np.linalg.norm(shift_left) >= distance:
-            return None
-        if np.linalg.norm(shift_left) + settings.rotation_length * np.linalg.norm(turn_left) >= score:
-            return None
-        return step
+        view_ahead = self._view(ahead, target)
+        return (ahead, view_ahead) if view_ahead.distance < view.distance and view_ahead.score < view.score else None
 
-    def _jacobian_step(
-        self, joints: np.ndarray, jacobian: np.ndarray, shift: np.ndarray, turn: np.ndarray, pull: np.ndarray, limited: bool = True
-    ) -> np.ndarray:
-        """Return a joint step (n,) [rad] of the damped pseudo-inverse, with what of `pull` (n,) [rad] does not move the hand.
-
-        A joint that would pass its limit is stopped there and the others take over what it leaves (one more round each time).
-        """
-        settings = self._settings
-        twist = np.concatenate(
-            [
-                shift * min(1.0, settings.jacobian_step / max(math.sqrt(shift @ shift), 1e-12)),
-                turn * min(1.0, settings.jacobian_rotation / max(math.sqrt(turn @ turn), 1e-12)),
-            ]
-        )
-        lowest, highest = self._chain.lower - joints, self._chain.upper - joints
-        largest = settings.jacobian_joint_step
-        step = np.zeros(len(joints))
-        free = np.ones(len(joints), dtype=bool)
-        while free.any():
-            moving = jacobian if free.all() else jacobian[:, free]
-            wanted = twist - moving @ pull[free]
-            if not free.all():
-                wanted = wanted - jacobian[:, ~free] @ step[~free]
-            step[free] = pull[free] + moving.T @ np.linalg.solve(moving @ moving.T + self._damping, wanted)
-            if not limited:
-                break
-            stopped = free & ((step < lowest) | (step > highest))
-            if not stopped.any():
-                break
-            step[stopped] = np.clip(step, lowest, highest)[stopped]
-            free &= ~stopped
-        turned = float(np.abs(step).max())
-        return step if turned <= largest else step * (largest / turned)
+    def _view(self, joints: np.ndarray, target: np.ndarray) -> _View:
+        """Return how far the hand is from the target."""
+        pose, jacobian = self._chain.forward_and_jacobian(joints)
+        shift, turn = target[:3, 3] - pose[:3, 3], rotation_vector(target[:3, :3] @ pose[:3, :3].T)
+        distance, angle = math.sqrt(shift @ shift), math.sqrt(turn @ turn)
+        return _View(jacobian, shift, turn, distance, angle, distance + self._settings.rotation_length * angle)
 
     def _reached_without_limits(self, joints: np.ndarray, target: np.ndarray, deadline: float) -> bool:
         """Tell whether the limits are what keeps the arm from the target."""
         return self._attempt(joints, target, self._mid_range, deadline, limited=False).converged
 
-
-def _pose_error(pose: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return displacement (3,) [m] and rotation vector (3,) [rad], both in the root frame, that carry `pose` onto `target`."""
-    return target[:3, 3] - pose[:3, 3], rotation_vector(target[:3, :3] @ pose[:3, :3].T)

@@ -22,9 +22,10 @@ class IkResult:
     """The answer of a solve.
 
     joints: (n,) [rad], the best found even when not CONVERGED, inside the limits; the start as given when nothing was tried.
-    Errors are those of `joints`, NaN when nothing was tried; for UNREACHABLE the position error is what the reach falls short. cycles
-    counts all steps of all attempts, network_cycles those that the network made. path: joint vectors from the start to `joints`,
-    step by step, of the attempt that gave the answer; with restarts > 0 that attempt began elsewhere, so the path's first step is a jump.
+    Errors are those of `joints`, NaN when nothing was tried; for UNREACHABLE the position error is what the reach falls
+    short. cycles counts all steps of all attempts, network_cycles those that the network made. path: joint vectors from the
+    start to `joints`, step by step, of the attempt that gave the answer; with restarts > 0 that attempt began elsewhere, so
+    the path's first step is a jump.
     """
 
     code: str

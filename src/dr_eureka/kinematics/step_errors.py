@@ -1,7 +1,7 @@
 """How far one single step misses: the network against the (damped) pseudo-inverse (paper 4.3, Figure 18).
 
-Two tests. `joint_change`, the paper's: the wanted step is one that some joint change of at most 0.5 rad makes, so the hand turns as
-well. `straight`: the hand goes straight and does not turn, as the hybrid asks for; whatever joints that takes.
+Two tests. `joint_change`, the paper's: the wanted step is one that some joint change of at most 0.5 rad makes, so the hand
+turns as well. `straight`: the hand goes straight and does not turn, as the hybrid asks for; whatever joints that takes.
 """
 
 from __future__ import annotations
@@ -38,13 +38,22 @@ def step_methods(chain: Chain, network: ArmNetwork | None, damping: float = 0.05
 
 
 def step_errors(
-    chain: Chain, methods: dict[str, Method], size: float, test: str, count: int, rng: np.random.Generator
+    chain: Chain,
+    methods: dict[str, Method],
+    size: float,
+    test: str,
+    count: int,
+    rng: np.random.Generator,
+    settings: SampleSettings = SampleSettings(),
 ) -> dict[str, np.ndarray]:
-    """Return position errors (count,) [m] after one step of `size` [m], by method, on the same random steps of the left arm."""
+    """Return position errors (count,) [m] after one step of `size` [m], by method, on the same random steps of the left arm.
+
+    Joints are drawn from the range of `settings`.
+    """
     draw = {"joint_change": _draw_joint_change, "straight": _draw_straight}[test]
     parts, missing = [], count
     while missing > 0:
-        joints, delta, targets = (array[:missing] for array in draw(chain, size, rng, SampleSettings()))
+        joints, delta, targets = (array[:missing] for array in draw(chain, size, rng, settings))
         parts.append((joints, delta, targets))
         missing -= len(joints)
     joints, delta, targets = (np.concatenate(arrays) for arrays in zip(*parts))
@@ -54,8 +63,10 @@ def step_errors(
     }
 
 
-def _draw_joint_change(chain: Chain, size: float, rng: np.random.Generator, settings: SampleSettings) -> tuple[np.ndarray, ...]:
-    """Draw joints and a change of each, then bend the change by as little as it takes for the hand to move by exactly `size`."""
+def _draw_joint_change(
+    chain: Chain, size: float, rng: np.random.Generator, settings: SampleSettings
+) -> tuple[np.ndarray, ...]:
+    """Draw joints and a change of each, then bend the change as little as it takes for the hand to move by `size`."""
     joints = rng.uniform(settings.lower, settings.upper, (_BATCH, len(chain)))
     change = rng.uniform(-settings.change, settings.change, joints.shape)
     start = chain.forward(joints)
@@ -64,7 +75,8 @@ def _draw_joint_change(chain: Chain, size: float, rng: np.random.Generator, sett
     for _ in range(8):
         poses, jacobians = chain.forward_and_jacobian(joints + change)
         linear = jacobians[:, :3]
-        missing = np.linalg.solve(linear @ linear.transpose(0, 2, 1) + 1e-6 * np.eye(3), (wanted - poses[:, :3, 3])[..., None])
+        squares = linear @ linear.transpose(0, 2, 1) + 1e-6 * np.eye(3)
+        missing = np.linalg.solve(squares, (wanted - poses[:, :3, 3])[..., None])
         change = change + np.clip(np.einsum("nij,ni->nj", linear, missing[..., 0]), -0.2, 0.2)
     targets = chain.forward(joints + change)
     delta = pose_errors(start, targets)

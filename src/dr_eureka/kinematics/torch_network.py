@@ -11,7 +11,7 @@ from dr_eureka.kinematics.network import BATCH_NORM_EPSILON, HIDDEN, INPUTS, OUT
 
 
 def build_model() -> nn.Sequential:
-    """Return the paper's network: 13-256x4-128x3-7, dense, batch norm and ReLU; 273,415 numbers with the batch-norm statistics."""
+    """Return the paper's network, 13-256x4-128x3-7 with batch norm and ReLU: 273,415 numbers with the norm's statistics."""
     layers: list[nn.Module] = []
     fan_in = INPUTS
     for width in HIDDEN:

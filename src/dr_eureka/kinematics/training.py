@@ -1,159 +1,153 @@
-"""Training of the arm network: the paper's architecture, on fresh samples, with a loss that knows where the hand ends up.
+"""Training of the arm network: the paper's architecture, on ten million streamed samples, with a loss that knows the hand.
 
-The paper's loss is the mean squared joint error. A joint error hurts only as far as it moves the hand, so the squared position
-and rotation errors of the hand, through differentiable forward kinematics, are added. Needs torch (Debian's python3-torch).
-
-The shipped weights took 20,000 steps, the first 7,000 of them under the learning-rate schedule of a run of 32,000 that was cut
-short; so a run from scratch does not repeat them digit by digit.
+The paper's loss is the mean squared joint error. A joint error hurts only as far as it moves the hand, so the squared
+position and rotation errors of the hand, through differentiable forward kinematics, outweigh it here; what is left of it
+picks the smallest of the joint steps that serve. Needs torch (Debian's python3-torch).
 """
 
 from __future__ import annotations
 
-import logging
 import math
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-from torch import nn
 
+from dr_eureka.checkpoint import load_checkpoint, save_checkpoint
 from dr_eureka.kinematics.arms import arm_chain
-from dr_eureka.kinematics.chain import Chain
-from dr_eureka.kinematics.network import ArmNetwork
+from dr_eureka.kinematics.network import WEIGHTS, ArmNetwork
+from dr_eureka.kinematics.sample_stream import DELTA, JOINTS, WANTED, SampleStream
 from dr_eureka.kinematics.samples import Samples, SampleSettings, draw_samples, pose_errors
 from dr_eureka.kinematics.torch_network import TorchChain, build_model, weights_of
 from dr_eureka.resources import save_weights
 
-_LOG = logging.getLogger(__name__)
-_JOINTS, _DELTA, _WANTED = slice(0, 7), slice(7, 13), slice(13, 32)  # columns of a row of the pool
+CHECKPOINT = "checkpoint.npz"
+LOG = "arm_network.csv"
+_VALIDATION = 3000
+_BAR = 30
 
 
 @dataclass(frozen=True)
-class TrainingSettings:
+class TrainingPlan:
     """How the network is trained; see `train`.
 
-    steps of `batch` samples each; pool: samples kept at hand, of which `refresh` are replaced by new ones every `round_steps`
-    steps. learning_rate falls along a cosine to zero (the paper: 0.005 and batches of 16,384 throughout). position_weight [1/m^2]
-    and rotation_weight [1/rad^2] of the hand's error beside the squared joint error [rad^2].
+    rounds: each draws `block` new samples, of which the latest blocks_kept are at hand, and steps through round_samples of
+    those, `batch` at a time. peak_rate: of Adam, after a warm-up over so many rounds, along a cosine down to zero (the
+    paper: 0.005 throughout). held_from: share of the rounds after which the batch norm keeps its statistics, as it does in
+    use: those of a batch differ from them at random, which the network otherwise spends itself on. position_weight [1/m^2],
+    rotation_weight [1/rad^2] of the hand's error and joint_weight [1/rad^2].
+
+    batch: the paper took 16,384. For as many samples, batches of 1024 take sixteen times the steps and end nearer.
     """
 
-    steps: int = 20000
+    rounds: int = 320
+    block: int = 31_250
+    blocks_kept: int = 64
+    round_samples: int = 180_000
     batch: int = 1024
-    pool: int = 2_000_000
-    first_pool: int = 300_000
-    refresh: int = 50_000
-    round_steps: int = 250
-    learning_rate: float = 0.003
-    warm_up: int = 500
-    position_weight: float = 200.0
+    peak_rate: float = 0.003
+    warm_up: float = 2.0
+    held_from: float = 0.15
+    position_weight: float = 1000.0
     rotation_weight: float = 8.0
+    joint_weight: float = 0.3
     seed: int = 1
+
+    def rate(self, rounds_done: float) -> float:
+        """Return the learning rate after so many rounds."""
+        warm_up = min(1.0, (rounds_done + 0.01) / self.warm_up)
+        return self.peak_rate * warm_up * 0.5 * (1.0 + math.cos(math.pi * rounds_done / self.rounds))
 
 
 def hand_loss(
-    kinematics: TorchChain, settings: TrainingSettings, joints: torch.Tensor, predicted: torch.Tensor, wanted: torch.Tensor
+    kinematics: TorchChain, plan: TrainingPlan, joints: torch.Tensor, predicted: torch.Tensor, wanted: torch.Tensor
 ) -> torch.Tensor:
-    """Return the mean loss of predicted joint steps; wanted (n, 19): least-norm step, then rotation and position of the target."""
+    """Return the mean loss of predicted joint steps; wanted (n, 19): least-norm step, target's rotation and position."""
     rotation, position = kinematics(joints + predicted)
     joint_error = ((predicted - wanted[:, :7]) ** 2).sum(1)
     # half the squared Frobenius distance of two rotations is the squared angle between them, for small angles
     turn_error = 0.5 * ((rotation.reshape(-1, 9) - wanted[:, 7:16]) ** 2).sum(1)
     shift_error = ((position - wanted[:, 16:19]) ** 2).sum(1)
-    return (joint_error + settings.rotation_weight * turn_error + settings.position_weight * shift_error).mean()
+    return (plan.joint_weight * joint_error + plan.rotation_weight * turn_error + plan.position_weight * shift_error).mean()
 
 
-def train(
-    out: Path,
-    checkpoint: Path,
-    settings: TrainingSettings = TrainingSettings(),
-    sample_settings: SampleSettings = SampleSettings(),
-) -> None:
-    """Train on the left arm and write the weights to `out`; resumes from `checkpoint` when that file exists.
+def train(plan: TrainingPlan, folder: Path, sample_settings: SampleSettings = SampleSettings()) -> ArmNetwork:
+    """Train on the left arm and return the network, going on from the checkpoint in the folder when there is one.
 
-    Progress goes to the log once a round. The samples of round r come from a generator seeded with (seed, r), so a resumed run
-    sees the samples of an unbroken one (in another order, as the pool is drawn anew).
+    After each round the folder gets the weights as they ship, checkpoint.npz, and a line in arm_network.csv. A round depends
+    on plan and checkpoint only: a run that was broken off ends with the weights of one that was not.
     """
+    folder.mkdir(parents=True, exist_ok=True)
+    checkpoint, log = folder / CHECKPOINT, folder / LOG
+    torch.set_num_threads(1)
+    torch.manual_seed(plan.seed)
     chain = arm_chain("left")
-    torch.manual_seed(settings.seed)
     model, kinematics = build_model(), TorchChain(chain)
-    optimiser = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
-    first_step = _resume(checkpoint, model, optimiser)
-    pool = _Pool(chain, settings, sample_settings)
+    optimiser = torch.optim.Adam(model.parameters(), lr=plan.peak_rate)
+    held_out = draw_samples(chain, _VALIDATION, np.random.default_rng([plan.seed, 2**31]), sample_settings)
+    stream = SampleStream(chain, sample_settings, plan.seed, plan.block, plan.blocks_kept)
+    first_round = 0
+    if checkpoint.exists():
+        first_round = load_checkpoint(checkpoint, {"model": model}, optimiser)
+    else:
+        log.write_text("round,samples_drawn,samples_seen,loss,hand_error_cm,seconds\n")
+    network = ArmNetwork(weights_of(model, sample_settings.lower, sample_settings.upper))
+    steps = max(1, plan.round_samples // plan.batch)
+    for number in range(first_round, plan.rounds):
+        started = time.monotonic()
+        loss = _train_round(model, kinematics, optimiser, stream, plan, sample_settings, number, steps)
+        weights = weights_of(model, sample_settings.lower, sample_settings.upper)
+        network = ArmNetwork(weights)
+        error_cm = 100.0 * validation_error(network, held_out)
+        save_weights(WEIGHTS, weights, folder)
+        save_checkpoint(checkpoint, {"model": model}, optimiser, number + 1)
+        done, seconds = number + 1, time.monotonic() - started
+        with log.open("a") as file:
+            file.write(f"{done},{done * plan.block},{done * steps * plan.batch},{loss:.5f},{error_cm:.4f},{seconds:.0f}\n")
+    return network
+
+
+def validation_error(network: ArmNetwork, samples: Samples) -> float:
+    """Return the mean position error [m] of the left hand after the network's steps."""
+    poses = arm_chain("left").forward(samples.joints + network.step(samples.joints, samples.delta))
+    return float(np.linalg.norm(pose_errors(poses, samples.target)[:, :3], axis=1).mean())
+
+
+def _train_round(
+    model: torch.nn.Sequential,
+    kinematics: TorchChain,
+    optimiser: torch.optim.Optimizer,
+    stream: SampleStream,
+    plan: TrainingPlan,
+    sample_settings: SampleSettings,
+    number: int,
+    steps: int,
+) -> float:
+    """Step through the batches of a round and return their mean loss."""
     lower, upper = (torch.tensor(limits, dtype=torch.float32) for limits in (sample_settings.lower, sample_settings.upper))
-    started, losses = time.monotonic(), []
-    model.train()
-    for step in range(first_step, settings.steps):
-        if step == first_step or step % settings.round_steps == 0:
-            pool.refresh(step // settings.round_steps)
+    model.train(number < plan.held_from * plan.rounds)
+    losses = []
+    for step, rows in enumerate(stream.batches(number, plan.batch, steps)):
         for group in optimiser.param_groups:
-            group["lr"] = _learning_rate(step, settings)
-        rows = pool.batch()
-        joints = rows[:, _JOINTS]
-        predicted = model(torch.cat([rows[:, _DELTA], (joints - lower) / (upper - lower) - 0.5], 1))
-        loss = hand_loss(kinematics, settings, joints, predicted, rows[:, _WANTED])
+            group["lr"] = plan.rate(number + step / steps)
+        joints = rows[:, JOINTS]
+        predicted = model(torch.cat([rows[:, DELTA], (joints - lower) / (upper - lower) - 0.5], 1))
+        loss = hand_loss(kinematics, plan, joints, predicted, rows[:, WANTED])
         optimiser.zero_grad(set_to_none=True)
         loss.backward()
         optimiser.step()
         losses.append(loss.item())
-        if (step + 1) % settings.round_steps == 0 or step + 1 == settings.steps:
-            torch.save({"step": step + 1, "model": model.state_dict(), "optimiser": optimiser.state_dict()}, checkpoint)
-            error = pool.validation_error(ArmNetwork(weights_of(model, sample_settings.lower, sample_settings.upper)))
-            seconds = (time.monotonic() - started) / (step + 1 - first_step)
-            _LOG.info(
-                "step %d/%d  loss %.5f  hand error %.2f cm  %.0f ms/step  %.0f s to go",
-                step + 1, settings.steps, np.mean(losses), 100.0 * error, 1000.0 * seconds, seconds * (settings.steps - step - 1),
-            )
-            losses.clear()
-    save_weights(out.name, weights_of(model, sample_settings.lower, sample_settings.upper), out.parent)
+        _show_progress(plan, number + (step + 1) / steps, losses)
+    return float(np.mean(losses))
 
 
-class _Pool:
-    """Samples at hand as rows of float32; old ones are overwritten by new ones round by round."""
-
-    def __init__(self, chain: Chain, settings: TrainingSettings, sample_settings: SampleSettings) -> None:
-        self._chain, self._settings, self._sample_settings = chain, settings, sample_settings
-        self._rows = torch.empty((settings.pool, 32))
-        self._filled = self._next = 0
-        self._order = torch.Generator().manual_seed(settings.seed)
-        self._validation = draw_samples(chain, 3000, np.random.default_rng([settings.seed, 2**31]), sample_settings)
-
-    def refresh(self, round_number: int) -> None:
-        """Add the new samples of a round."""
-        count = self._settings.refresh if self._filled else self._settings.first_pool
-        samples = draw_samples(self._chain, count, np.random.default_rng([self._settings.seed, round_number]), self._sample_settings)
-        places = (self._next + np.arange(count)) % self._settings.pool
-        self._rows[torch.from_numpy(places)] = torch.from_numpy(_rows(samples))
-        self._next = int(places[-1] + 1) % self._settings.pool
-        self._filled = min(self._filled + count, self._settings.pool)
-
-    def batch(self) -> torch.Tensor:
-        return self._rows[torch.randint(self._filled, (self._settings.batch,), generator=self._order)]
-
-    def validation_error(self, network: ArmNetwork) -> float:
-        """Return the mean position error [m] of the network on samples it has never seen."""
-        samples = self._validation
-        poses = self._chain.forward(samples.joints + network.step(samples.joints, samples.delta))
-        return float(np.linalg.norm(pose_errors(poses, samples.target)[:, :3], axis=1).mean())
-
-
-def _rows(samples: Samples) -> np.ndarray:
-    rotation = samples.target[:, :3, :3].reshape(-1, 9)
-    return np.hstack([samples.joints, samples.delta, samples.change, rotation, samples.target[:, :3, 3]]).astype(np.float32)
-
-
-def _learning_rate(step: int, settings: TrainingSettings) -> float:
-    warm_up = min(1.0, (step + 1) / settings.warm_up)
-    return settings.learning_rate * warm_up * 0.5 * (1.0 + math.cos(math.pi * step / settings.steps))
-
-
-def _resume(checkpoint: Path, model: nn.Module, optimiser: torch.optim.Optimizer) -> int:
-    """Load a checkpoint if there is one; return the step to go on from."""
-    if not checkpoint.exists():
-        return 0
-    state = torch.load(checkpoint)
-    model.load_state_dict(state["model"])
-    optimiser.load_state_dict(state["optimiser"])
-    _LOG.info("resuming from %s at step %d", checkpoint, state["step"])
-    return int(state["step"])
+def _show_progress(plan: TrainingPlan, rounds_done: float, losses: list[float]) -> None:
+    """Draw how much is done on stderr, where that is a terminal."""
+    if sys.stderr.isatty():
+        bar = "#" * int(_BAR * rounds_done / plan.rounds)
+        sys.stderr.write(f"\rround {rounds_done:.2f}/{plan.rounds} [{bar:<{_BAR}}] loss {np.mean(losses[-50:]):.4f} ")
+        sys.stderr.write("\n" if rounds_done >= plan.rounds else "")
+        sys.stderr.flush()

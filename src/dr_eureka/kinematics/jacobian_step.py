@@ -1,0 +1,74 @@
+"""One step of the damped Jacobian (paper 3.4) inside the joint limits, with what spare freedom the arm has put to use."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg.lapack import dposv
+
+from dr_eureka.kinematics.chain import Chain
+from dr_eureka.kinematics.hybrid_settings import HybridSettings
+
+_LEAST_DAMPING = 1e-4  # keeps J J^T invertible at singularities, where the settings leave the inverse undamped
+
+
+class JacobianStep:
+    """Joint steps of the damped pseudo-inverse J^T (J J^T + lambda^2 I)^-1."""
+
+    def __init__(self, chain: Chain, settings: HybridSettings) -> None:
+        self._lower, self._upper, self._settings = chain.lower, chain.upper, settings
+        self._damping = max(settings.damping, _LEAST_DAMPING) ** 2 * np.eye(6)
+
+    def step(
+        self,
+        joints: np.ndarray,
+        jacobian: np.ndarray,
+        shift: np.ndarray,
+        turn: np.ndarray,
+        pull: np.ndarray,
+        limited: bool = True,
+    ) -> np.ndarray:
+        """Return a joint step (n,) [rad] towards a hand displaced by shift (3,) [m] and turned by turn (3,) [rad].
+
+        jacobian: (6, n) at joints (n,) [rad]. pull: (n,) [rad], what of it does not move the hand is added. Unless `limited`
+        is False, a joint that would pass its limit is stopped there and the others take over what it leaves.
+        """
+        settings = self._settings
+        twist = np.concatenate(
+            [
+                shift * min(1.0, settings.jacobian_step / max(math.sqrt(shift @ shift), 1e-12)),
+                turn * min(1.0, settings.jacobian_rotation / max(math.sqrt(turn @ turn), 1e-12)),
+            ]
+        )
+        step = pull + self._inverse(jacobian, twist - jacobian @ pull)
+        if limited:
+            lowest, highest = self._lower - joints, self._upper - joints
+            if (step < lowest).any() or (step > highest).any():
+                step = self._stopped(step, jacobian, twist, pull, lowest, highest)
+        turned = float(np.abs(step).max())
+        return step if turned <= settings.jacobian_joint_step else step * (settings.jacobian_joint_step / turned)
+
+    def _stopped(
+        self,
+        step: np.ndarray,
+        jacobian: np.ndarray,
+        twist: np.ndarray,
+        pull: np.ndarray,
+        lowest: np.ndarray,
+        highest: np.ndarray,
+    ) -> np.ndarray:
+        """Return the step with joints stopped at their limits, more of them each round until none passes its own."""
+        step, free = step.copy(), np.ones(len(step), dtype=bool)
+        while True:
+            passing = free & ((step < lowest) | (step > highest))
+            if not passing.any():
+                return step
+            step[passing] = np.clip(step, lowest, highest)[passing]
+            free &= ~passing
+            moving = jacobian[:, free]
+            step[free] = pull[free] + self._inverse(moving, twist - jacobian[:, ~free] @ step[~free] - moving @ pull[free])
+
+    def _inverse(self, jacobian: np.ndarray, twist: np.ndarray) -> np.ndarray:
+        """Return J^T (J J^T + lambda^2 I)^-1 twist."""
+        return jacobian.T @ dposv(jacobian @ jacobian.T + self._damping, twist)[1]
