@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import time
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
@@ -21,6 +20,7 @@ from dr_eureka.game.state import State
 from dr_eureka.nodes import messages
 from dr_eureka.nodes.images import compressed_from_rgb, image_from_rgb, info_from_camera
 from dr_eureka.nodes.lock_step import LockStep
+from dr_eureka.nodes.pace import Pace
 from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, take_count, take_number, take_state, take_state_unless
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.pieces import load_pieces
@@ -40,8 +40,6 @@ NAME = "fake_robotis_manager"
 _SHOW_LIMIT_S = 10.0
 # While the robot waits for a person's word about the card, the person leaves it where it is.
 _CARD_PHASES = (Phase.LOOKING_FOR_CARD, Phase.WAITING_FOR_CONFIRMATION)
-# A simulation that fell this far behind the wanted pace does not race to catch up.
-_LARGEST_LAG_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ class FakeRobotisManager:
         * world, camera, node: see config/fake_robotis_manager.yaml
     """
 
-    def __init__(self, world: World, start: State, camera: CameraModel, cards: CardHolder, seed: int, factor: float,
+    def __init__(self, world: World, start: State, camera: CameraModel, cards: CardHolder, seed: int, pace: Pace,
                  cycle_s: float, settings: ManagerNodeSettings):
         self._world = world
         self._start = start
@@ -90,13 +88,12 @@ class FakeRobotisManager:
         self._camera = camera
         self._cards = cards
         self._seed = seed
-        self._factor = factor
+        self._pace = pace
         self._cycle_s = cycle_s
         self._settings = settings
         self._manager = RobotisManager()
         self._notes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._cycle = 0
-        self._pace: Optional[tuple[float, int]] = None
         self._last_verdict: Optional[msg.Referee] = None
         self._present = rospy.Publisher("robotis/present_joint_states", JointState, queue_size=10)
         self._goal = rospy.Publisher("robotis/goal_joint_states", JointState, queue_size=10)
@@ -144,7 +141,7 @@ class FakeRobotisManager:
                 self._notes.get()()
             for command in self._lock_step.take():
                 self._apply(command)
-            self._keep_pace()
+            self._pace.keep(self._cycle * self._cycle_s)
         return 0
 
     def _due(self, rate_hz: float) -> bool:
@@ -253,17 +250,6 @@ class FakeRobotisManager:
         self._notes.put(partial(self._spoiler.spoil_next_pour, fault))
         return srv.SpoilPourResponse(True, "")
 
-    def _keep_pace(self) -> None:
-        """Hold the simulation back to the wanted real-time factor."""
-        if self._factor <= 0.0:
-            return
-        now_s = time.monotonic()
-        began_s, began_cycle = self._pace or (now_s, self._cycle)
-        ahead_s = began_s + (self._cycle - began_cycle) * self._cycle_s / self._factor - now_s
-        if ahead_s > 0.0:
-            time.sleep(ahead_s)
-        self._pace = (began_s, began_cycle) if ahead_s > -_LARGEST_LAG_S else None
-
 
 def _serve() -> int:
     parameters = private_parameters()
@@ -273,7 +259,7 @@ def _serve() -> int:
     camera = build(CameraSettings, take(parameters, "camera"), f"{where} camera")
     start, card = take_state(parameters, "start"), take_state_unless(parameters, "card", "random")
     seed = take_count(parameters, "seed", least=0)
-    factor = take_number(parameters, "realtime_factor", least=0.0)
+    pace = Pace(take_number(parameters, "realtime_factor", least=0.0))
     refuse_rest(parameters)
     textures = SceneTextures(sheet=sheet_image(load_pieces()))
     world = World(world_settings, seed, start, textures, camera=camera)
@@ -281,7 +267,7 @@ def _serve() -> int:
     model = CameraModel(camera.width, camera.height, matrix, camera.distortion)
     try:
         return FakeRobotisManager(
-            world, start, model, CardHolder(seed, card), seed, factor, world_settings.cycle, node_settings
+            world, start, model, CardHolder(seed, card), seed, pace, world_settings.cycle, node_settings
         ).run()
     finally:
         world.close()

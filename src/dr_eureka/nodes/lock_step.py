@@ -1,29 +1,30 @@
-"""Waiting for the controller's answer to a joint state, so that results do not depend on the machine's load."""
+"""Waiting for the controller's answer to a joint state or a picture, so that results do not depend on the machine's load."""
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import Callable
+from typing import Callable, Generic, TypeVar
 
-from sensor_msgs.msg import JointState
-
+# A message with a header.
+Stamped = TypeVar("Stamped")
 _RECENT_NS = 200_000_000
 
 
-class LockStep:
+class LockStep(Generic[Stamped]):
     """Collects joint commands, and holds the simulation back until the present state is answered.
 
     A controller answers a state by a command with that state's stamp. It is waited for only while it is connected and
     has answered lately; when it fails to answer within the limit, the simulation goes on without it until it answers
-    again. Commands with other stamps are taken as they come.
+    again. Commands with other stamps are taken as they come. A state may as well be a picture, and a command what was found
+    in it.
     """
 
     def __init__(self, limit_s: float, connected: Callable[[], bool]):
         self._limit_s = limit_s
         self._connected = connected
         self._arrived = threading.Condition()
-        self._commands: list[JointState] = []
+        self._commands: list[Stamped] = []
         self._answering = False
         self._expected_ns = 0
         self._answered = False
@@ -39,7 +40,7 @@ class LockStep:
             self._expected_ns = stamp_ns
             self._answered = False
 
-    def on_command(self, command: JointState) -> None:
+    def on_command(self, command: Stamped) -> None:
         """Take a command from the subscriber's thread."""
         with self._arrived:
             self._commands.append(command)
@@ -50,7 +51,7 @@ class LockStep:
                 self._answered = True
                 self._arrived.notify()
 
-    def take(self) -> list[JointState]:
+    def take(self) -> list[Stamped]:
         """Return the commands of this cycle in the order in which they came."""
         give_up_s = time.monotonic() + self._limit_s
         with self._arrived:

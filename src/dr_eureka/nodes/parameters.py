@@ -29,7 +29,7 @@ def take(parameters: dict[str, Any], key: str) -> Any:
     try:
         return parameters.pop(key)
     except KeyError:
-        raise ParameterError(f"{rospy.get_name()}/{key}: parameter is missing; game.launch sets it") from None
+        raise ParameterError(f"{rospy.get_name()}/{key}: parameter is missing; the launch file sets it") from None
 
 
 def refuse_rest(parameters: dict[str, Any]) -> None:
