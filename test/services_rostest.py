@@ -87,6 +87,15 @@ class ServicesTest(unittest.TestCase):
         self.until(lambda: rospy.get_time() > start + 0.5, "half a second later")
         self.assertAlmostEqual(self.joint("head_p"), before, places=3)
 
+    def test_a_motion_into_the_table_is_not_begun_and_says_what_would_touch(self):
+        before = self.joint("l_arm_sh_p1")
+        answer = self.services["set_joints"](["l_arm_sh_p1", "l_arm_sh_r"], [1.2, 0.0], 2.0)
+        self.assertEqual(answer.result, EngineStatus.OK, answer.message)
+        self.until(lambda: self.status.state == EngineStatus.FAULT, "refused")
+        self.assertEqual(self.status.code, EngineStatus.COLLISION)
+        self.assertRegex(self.status.message, "l_arm_.*(table|board|pelvis)")
+        self.assertAlmostEqual(self.joint("l_arm_sh_p1"), before, places=3)
+
     def test_a_second_request_is_refused_while_the_first_is_carried_out(self):
         self.services["set_joints"](["head_y"], [0.5], 3.0)
         self.until(lambda: self.status.state == EngineStatus.BUSY, "busy")
@@ -106,7 +115,7 @@ class ServicesTest(unittest.TestCase):
     def strategy(self, x):
         tubes = [TubePlace(name, Point(x, y, 0.775), 0.001) for name, y in (("left", 0.11), ("center", 0.0), ("right", -0.11))]
         actions = [Action(kind=Action.PICK, hand="left", tube="left")]
-        return self.services["execute_strategy"](actions, tubes, bytes([2, 2, 2]), "lock", False)
+        return self.services["execute_strategy"](actions, tubes, bytes([2, 2, 2]), "lock", False, False)
 
     def test_an_unreachable_tube_has_its_own_code_and_a_strategy_number(self):
         answer = self.strategy(x=1.6)

@@ -64,10 +64,10 @@ def test_a_single_pour_costs_its_ball_and_four_picks_and_places(texts):
 
 
 def test_the_chance_of_one_pour_is_the_share_that_goes_as_intended_or_is_mended(texts):
-    model = ChanceModel(texts, SETTINGS, "direct")
-    outcome = SETTINGS.outcomes["direct"][4][1]
+    model = ChanceModel(texts, SETTINGS, "linear")
+    outcome = SETTINGS.outcomes["linear"][4][1]
     # One ball short is poured again; one ball over is poured back, one out of three, which is as risky.
-    assert outcome == SETTINGS.outcomes["direct"][3][1]
+    assert outcome == SETTINGS.outcomes["linear"][3][1]
     chance, _ = model.solve("RRGG|P|P", "RRG|PG|P")
     assert chance == pytest.approx(outcome.intended / (1 - outcome.fewer - outcome.more), abs=1e-9)
 

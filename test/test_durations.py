@@ -15,7 +15,7 @@ from dr_eureka.resources import resource_path
 
 PICK = {"from_home": 4.0, "after_place": 3.0}
 PLACE, READY, HOME, POUR = 5.0, {"left": 1.5, "center": 1.0, "right": 1.75}, 1.25, 2.5
-UPRIGHT = {"lock": 0.75, "direct": 0.5}
+UPRIGHT = {"lock": 0.75, "linear": 0.5}
 
 
 def game(goal, strategy="fastest", pour="lock", pause=0.0):
@@ -69,7 +69,7 @@ def test_what_actions_last_is_found_again(pause):
 
 
 def test_each_game_counts_for_the_way_in_which_it_poured():
-    found = found_in([*GAMES, game("GR|PG|RP", pour="direct")])
+    found = found_in([*GAMES, game("GR|PG|RP", pour="linear")])
     assert {method: found["upright", method]["seconds"] for method in UPRIGHT} == UPRIGHT
     assert found["home",]["trials"] == len(GAMES) + 1
 
@@ -133,7 +133,7 @@ def test_the_command_shows_the_figures_beside_those_of_the_yaml(tmp_path, capsys
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"pour": "sling"}, "pour is 'sling'; expected a game whose pour is lock or direct"),
+        ({"pour": "sling"}, "pour is 'sling'; expected a game whose pour is lock or linear or profiled"),
         ({"pour": None}, "pour is None"),
         ({"actions": []}, "no duration can be told from these games"),
     ],
@@ -147,7 +147,7 @@ def test_a_game_that_tells_nothing_is_refused(tmp_path, capsys, change, message)
 def test_a_game_of_before_that_does_not_tell_how_it_poured_is_refused(tmp_path, capsys):
     (tmp_path / "game.json").write_text(json.dumps({key: value for key, value in GAMES[0].items() if key != "pour"}))
     assert main([str(tmp_path)]) == 2
-    assert "it does not tell how it poured; expected a game whose pour is lock or direct" in capsys.readouterr().err
+    assert "it does not tell how it poured; expected a game whose pour is lock or linear or profiled" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"actions": [{}]}', '{"games": [3]}'])

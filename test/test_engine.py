@@ -1,6 +1,8 @@
 """The control engine against an ideal robot: joints that are where they were told, fingers that stop on a tube."""
 
 import math
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -21,21 +23,26 @@ CYCLE = 0.008
 ON_TUBE = 0.959
 
 
-def make_engine() -> ControlEngine:
-    return ControlEngine(ControlSettings.from_mapping(load_yaml(WHERE), WHERE), load_pieces())
+def make_engine(**options) -> ControlEngine:
+    return ControlEngine(ControlSettings.from_mapping(load_yaml(WHERE), WHERE), load_pieces(), **options)
 
 
 class IdealRobot:
-    """Joints follow at once; fingers stop at `finger_stop` rad."""
+    """Joints follow at once; fingers stop at `finger_stop` rad, those of hands in `empty` do not."""
 
     def __init__(self, engine: ControlEngine, finger_stop: float = ON_TUBE):
         self.engine, self.finger_stop, self.time = engine, finger_stop, 0.0
         self.joints = dict.fromkeys(CONTROLLED_JOINTS, 0.0)
         self.history = [dict(self.joints)]
+        self.empty: set[str] = set()
         self.cycle()
 
+    def _stopped(self, name: str, angle: float) -> float:
+        stops = name.endswith("grip") and name[0] not in {hand[0] for hand in self.empty}
+        return min(angle, self.finger_stop) if stops else angle
+
     def cycle(self) -> None:
-        seen = {name: min(q, self.finger_stop) if name.endswith("grip") else q for name, q in self.joints.items()}
+        seen = {name: self._stopped(name, angle) for name, angle in self.joints.items()}
         self.joints = self.engine.tick(self.time, seen)
         self.history.append(dict(self.joints))
         self.time += CYCLE
@@ -77,7 +84,7 @@ def test_the_engine_holds_both_tubes_after_a_pour_until_it_is_told_what_to_do(pu
         assert engine.body.places[tube] == pytest.approx(foot, abs=1e-3)
 
 
-@pytest.mark.parametrize("method", ["lock", "direct"])
+@pytest.mark.parametrize("method", ["lock", "linear", "profiled"])
 @pytest.mark.parametrize("source, target", [("left", "right"), ("center", "left"), ("right", "center")])
 def test_a_pour_between_any_two_tubes_runs_to_its_end_and_puts_both_back(method, source, target):
     engine = make_engine()
@@ -124,6 +131,38 @@ def test_fingers_that_close_on_nothing_end_the_strategy_and_the_robot_holds():
     assert robot.joints == held
 
 
+@pytest.mark.parametrize("at_once", [False, True])
+def test_after_a_hand_closed_on_nothing_the_other_tube_is_put_back_and_a_new_strategy_may_begin(at_once):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    robot.empty = {"right"}
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS, hands_at_once=at_once)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.GRASP_EMPTY and "right hand closed on tube 'right'" in engine.status.message
+    assert not engine.body.held
+    for hand in ("left", "right"):
+        home = engine.body.arms[hand].posture(engine.settings.postures.home)
+        np.testing.assert_allclose(engine.body.commanded(hand), home, atol=1e-6)
+    assert engine.body.places["left"] == pytest.approx(PLACES["left"], abs=1e-3)
+    robot.empty = set()
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS)
+    assert robot.run() == EngineState.DONE, engine.status
+
+
+@pytest.mark.parametrize("moment", [2, 3])
+def test_after_a_tube_slipped_out_of_a_hand_the_other_is_put_back(moment):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    actions = actions_for([Pour("left", "right", 1)])
+    engine.start(actions, PLACES, BALLS)
+    while engine.status.action_index < moment:
+        robot.cycle()
+    robot.empty = {"left"}
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.TUBE_SLIPPED, engine.status
+    assert not engine.body.held and "right" in engine.body.places
+
+
 @pytest.mark.parametrize("foot", [(0.9, 0.1, 0.775), (0.44, -0.5, 0.775)])
 def test_a_tube_out_of_reach_is_named(foot):
     engine = make_engine()
@@ -150,17 +189,61 @@ def test_a_second_strategy_is_refused_while_busy():
     assert caught.value.code == EngineCode.BUSY
 
 
-def test_stop_holds_within_one_cycle():
+@pytest.mark.parametrize("seed", range(3))
+def test_a_stop_brakes_in_the_next_cycle_from_any_point_of_a_strategy_and_then_holds(seed):
     engine = make_engine()
     robot = IdealRobot(engine)
-    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
-    for _ in range(60):
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS, hands_at_once=bool(seed % 2))
+    for _ in range(int(np.random.default_rng(seed).integers(60, 1200))):
         robot.cycle()
+    names = [*engine.body.arms["left"].joints, *engine.body.arms["right"].joints]
+    first = len(robot.history) - 2
     engine.stop()
-    before = dict(robot.joints)
-    robot.cycle()
-    assert robot.joints == before
     assert engine.status.code == EngineCode.STOPPED
+    for _ in range(30):
+        robot.cycle()
+    goals = np.array([[row[name] for name in names] for row in robot.history[first:]])
+    steps = np.abs(np.diff(goals, axis=0)).max(axis=1)
+    # 0.05 s brake 1.5 rad/s at 30 rad/s^2.
+    assert steps[1] < steps[0] or steps[0] < 1e-6
+    assert (steps[9:] == 0.0).all()
+    assert engine.status.code == EngineCode.STOPPED
+
+
+def test_a_cycle_does_not_wait_for_a_motion_that_is_being_planned_and_a_stop_leaves_it(monkeypatch):
+    engine = make_engine(wait_for_plans=False)
+    robot = IdealRobot(engine)
+    may_plan, real_hit = threading.Event(), engine.body.hit
+
+    def slow_hit(motion):
+        assert may_plan.wait(10.0)
+        return real_hit(motion)
+
+    monkeypatch.setattr(engine.body, "hit", slow_hit)
+    engine.move_joints({"head_p": 0.5}, 0.5)
+    before = dict(robot.joints)
+    for _ in range(20):
+        robot.cycle()
+    assert robot.joints == before and engine.status.state == EngineState.BUSY
+    engine.stop()
+    assert engine.status.code == EngineCode.STOPPED
+    may_plan.set()
+    engine.move_joints({"head_p": 0.2}, 0.5)
+    while engine.status.state == EngineState.BUSY:
+        robot.cycle()
+        time.sleep(0.0005)
+    assert engine.status.state == EngineState.DONE and robot.joints["head_p"] == pytest.approx(0.2)
+
+
+def test_a_motion_into_a_collision_is_refused_before_it_begins():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    before = dict(robot.joints)
+    engine.move_joints({"l_arm_sh_p1": 1.3}, 2.0)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.COLLISION
+    assert "l_arm" in engine.status.message and "table" in engine.status.message
+    assert robot.joints == before
 
 
 @pytest.mark.parametrize("spoil", [lambda j: j.pop("l_arm_el_y"), lambda j: j.update(l_arm_el_y=math.nan)])
@@ -172,6 +255,24 @@ def test_a_joint_state_that_lacks_a_joint_ends_in_a_fault_that_names_it(spoil):
     goals = engine.tick(1.0, joints)
     assert engine.status.code == EngineCode.INVALID_VALUE and "l_arm_el_y" in engine.status.message
     assert all(math.isfinite(goal) for goal in goals.values())
+
+
+def test_a_hand_stopped_low_beside_a_tube_finds_home_without_touching_it():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start([Action("pick", "right", "center")], PLACES, BALLS)
+    # The fingers open on the way and begin to close when the hand is low.
+    while robot.joints["r_arm_grip"] < 0.7:
+        robot.cycle()
+    engine.stop()
+    for _ in range(10):
+        robot.cycle()
+    engine.move_joints({"r_arm_grip": engine.settings.grip.open}, 0.5)
+    robot.run()
+    low = engine.body.arms["right"].pose(robot.joints)[2, 3]
+    engine.start([], PLACES, BALLS)
+    assert robot.run() == EngineState.DONE, engine.status
+    assert engine.body.arms["right"].pose(robot.joints)[2, 3] > low + 0.1
 
 
 def test_a_joint_that_does_not_follow_is_a_tracking_error():

@@ -67,7 +67,7 @@ class World:
         self.cards = list(cards)
         self.results = list(results)
         self.reports, self.plans, self.found_cards, self.found_tubes = [], [], [], []
-        self.confirmations, self.surprises, self.answers = [], [], []
+        self.confirmations, self.surprises, self.answers, self.faults = [], [], [], []
         self.gazes, self.strategies, self.stops = [], [], 0
         self.answer = EngineCode.OK
         self.now = Observation(
@@ -151,6 +151,9 @@ class World:
 
     def on_surprise(self, expected, seen):
         self.surprises.append((str(expected), str(seen)))
+
+    def on_fault(self, message):
+        self.faults.append(message)
 
     def on_report(self, report):
         self.reports.append(report)
@@ -678,11 +681,26 @@ def test_every_wait_ends_with_a_name(fault, code, words):
 def test_a_fault_of_the_engine_ends_the_game_with_the_engines_own_code():
     world = World(goal=GOAL, games=3)
     world.until_playing()
-    world.engine(EngineState.FAULT, EngineCode.GRASP_EMPTY, action_index=1, message="left hand closed on nothing")
+    world.engine(EngineState.FAULT, EngineCode.TRACKING_ERROR, action_index=1, message="l_arm_el_y is 0.2 rad from its goal")
     report = world.step()
     assert (report.phase, report.code) == (Phase.FAILED, GameCode.ENGINE_FAULT)
-    assert report.message == "control_engine: GRASP_EMPTY: action 1: left hand closed on nothing"
+    assert report.message == "control_engine: TRACKING_ERROR: action 1: l_arm_el_y is 0.2 rad from its goal"
     assert world.flow.over
+
+
+@pytest.mark.parametrize("code", EngineCode.PUT_DOWN)
+def test_a_grasp_that_failed_is_tried_again_from_what_is_seen_but_not_without_end(code):
+    world = World(goal=GOAL, results=["RR|GG|PP"] * (SETTINGS.most_replans + 1))
+    for attempt in range(1, SETTINGS.most_replans + 1):
+        world.until_playing()
+        world.engine(EngineState.FAULT, code, strategy_id=attempt, action_index=1, message="left hand closed on nothing")
+        assert world.step().phase == Phase.CHECKING
+        assert world.faults == [f"control_engine: {code}: action 1: left hand closed on nothing"] * attempt
+    world.until_playing()
+    world.engine(EngineState.FAULT, code, strategy_id=attempt + 1, action_index=1, message="left hand closed on nothing")
+    report = world.step()
+    assert (report.phase, report.code, report.replans) == (Phase.FAILED, GameCode.ENGINE_FAULT, SETTINGS.most_replans)
+    assert report.message == f"control_engine: {code}: action 1: left hand closed on nothing, after 2 replans"
 
 
 def test_a_stop_by_hand_ends_the_game():

@@ -107,7 +107,7 @@ def test_the_fastest_plan_pours_several_balls_at_once(capsys):
 
 
 def test_the_surest_plan_says_what_to_do_when_a_pour_goes_wrong(capsys):
-    arguments = ["RRP|PG|G", "--strategy", "surest", "--pour", "direct"]
+    arguments = ["RRP|PG|G", "--strategy", "surest", "--pour", "linear"]
     assert main([*arguments, "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert 0.9 < plan["chance"] < 1.0

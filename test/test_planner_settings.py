@@ -19,7 +19,7 @@ def load_changed(tmp_path, change):
 
 def test_the_shipped_settings_know_both_ways_to_pour():
     settings = load_planner_settings()
-    assert settings.methods == ("lock", "direct")
+    assert settings.methods == ("lock", "linear", "profiled")
     assert settings.reach == {"left": ("left", "center"), "right": ("center", "right")}
 
 
@@ -34,12 +34,12 @@ def test_the_shipped_settings_know_both_ways_to_pour():
         (lambda c: c["durations"]["place"]["right"].pop("center"), "durations.place.right: lacks the key 'center'"),
         (lambda c: c["durations"]["pour"]["lock"].pop(3), "durations.pour.lock: lacks the key 3"),
         (lambda c: c["durations"]["upright"]["lock"].update(seconds=-1.0), "durations.upright.lock.seconds: is -1.0"),
-        (lambda c: c["durations"]["upright"].pop("direct"), "durations.upright: lacks the key 'direct'"),
-        (lambda c: c["outcomes"].pop("direct"), "outcomes: lacks the key 'direct'"),
-        (lambda c: c["outcomes"]["direct"][4][3].update(more=0.5), "outcomes.direct.4.3: shares add up to 1.42; expected 1"),
+        (lambda c: c["durations"]["upright"].pop("linear"), "durations.upright: lacks the key 'linear'"),
+        (lambda c: c["outcomes"].pop("linear"), "outcomes: lacks the key 'linear'"),
+        (lambda c: c["outcomes"]["linear"][4][3].update(more=0.5), "outcomes.linear.4.3: shares add up to 1.42; expected 1"),
         (
-            lambda c: c["outcomes"]["direct"][2].update({2: {"intended": 0.9, "more": 0.1}}),
-            "outcomes.direct.2.2.more: is 0.1; expected 0, for the tube holds 2 balls",
+            lambda c: c["outcomes"]["linear"][2].update({2: {"intended": 0.9, "more": 0.1}}),
+            "outcomes.linear.2.2.more: is 0.1; expected 0, for the tube holds 2 balls",
         ),
         (lambda c: c["outcomes"]["lock"][1].update({1: {"intended": 0.0, "lost": 1.0}}), "outcomes.lock.1.1.intended: is 0"),
         (lambda c: c.update(hands_at_once="no"), "hands_at_once: is 'no'"),

@@ -23,10 +23,10 @@ def make_engine() -> ControlEngine:
 
 
 @pytest.mark.parametrize(
-    "start, pour, method",
-    [("RRGG|P|P", Pour("left", "center", 1), "lock"), ("RG|GPP|R", Pour("center", "right", 1), "direct")],
+    "start, pour, method, at_once",
+    [("RRGG|P|P", Pour("left", "center", 1), "lock", True), ("RG|GPP|R", Pour("center", "right", 1), "profiled", False), ("RG|GPP|R", Pour("center", "right", 2), "linear", False)],
 )
-def test_exactly_one_ball_goes_from_one_tube_into_the_other(start, pour, method):
+def test_exactly_one_ball_goes_from_one_tube_into_the_other(start, pour, method, at_once):
     state, engine = State.parse(start), make_engine()
     world = World(load_world_settings(), seed=5, start=state)
     # Tubes as a camera would locate them: 2 mm off.
@@ -41,7 +41,8 @@ def test_exactly_one_ball_goes_from_one_tube_into_the_other(start, pour, method)
             known = engine.body.arms[hand].pose(world.joint_positions()) @ held.end_from_tube
             tilt.append(np.degrees(np.arccos(np.clip(true[:3, 2] @ known[:3, 2], -1.0, 1.0))))
 
-    status = play_actions(world, engine, actions_for([pour]), places, {t: len(state.tube(t)) for t in TUBES}, method, each_cycle=watch)
+    balls = {tube: len(state.tube(tube)) for tube in TUBES}
+    status = play_actions(world, engine, actions_for([pour]), places, balls, method, each_cycle=watch, hands_at_once=at_once)
     verdict = world.referee()
     world.close()
     assert status.state == EngineState.DONE, status

@@ -8,12 +8,12 @@ from dr_eureka.game.planner_settings import PLANNER_FILE, load_planner_settings,
 from dr_eureka.resources import load_yaml, resource_path
 from dr_eureka.settings import SettingsError
 
-RIGHT = PourTrial("direct", held=4, count=2, poured=2, lost=0)
-LESS = PourTrial("direct", held=4, count=2, poured=1, lost=0)
-NONE = PourTrial("direct", held=4, count=2, poured=0, lost=0)
-MORE = PourTrial("direct", held=4, count=2, poured=3, lost=0)
-LOST = PourTrial("direct", held=4, count=2, poured=2, lost=1)
-KEY = ("outcomes", "direct", 4, 2)
+RIGHT = PourTrial("linear", held=4, count=2, poured=2, lost=0)
+LESS = PourTrial("linear", held=4, count=2, poured=1, lost=0)
+NONE = PourTrial("linear", held=4, count=2, poured=0, lost=0)
+MORE = PourTrial("linear", held=4, count=2, poured=3, lost=0)
+LOST = PourTrial("linear", held=4, count=2, poured=2, lost=1)
+KEY = ("outcomes", "linear", 4, 2)
 
 
 @pytest.fixture
@@ -50,12 +50,12 @@ def test_shares_that_are_rounded_add_up_all_the_same():
 def test_the_command_tells_the_planner_and_keeps_the_comments(tmp_path, planner_yaml, capsys):
     before = planner_yaml.read_text()
     assert main([str(trials_file(tmp_path, *[RIGHT] * 98, LESS, MORE)), "--write"]) == 0
-    assert "direct, 2 of 4 balls: trials          0.9800    0.0100    0.0100    0.0000     100" in capsys.readouterr().out
+    assert "linear, 2 of 4 balls: trials          0.9800    0.0100    0.0100    0.0000     100" in capsys.readouterr().out
     after = planner_yaml.read_text()
     changed = [(old, new) for old, new in zip(before.splitlines(), after.splitlines()) if old != new]
     assert len(before.splitlines()) == len(after.splitlines())
     assert [new.strip() for _, new in changed] == ["2: {intended: 0.98, fewer: 0.01, more: 0.01, trials: 100}"]
-    outcome = planner_settings(load_yaml(str(planner_yaml)), "told").outcomes["direct"][4][2]
+    outcome = planner_settings(load_yaml(str(planner_yaml)), "told").outcomes["linear"][4][2]
     assert (outcome.intended, outcome.fewer, outcome.more, outcome.lost, outcome.trials) == (0.98, 0.01, 0.01, 0.0, 100)
 
 
@@ -68,7 +68,7 @@ def test_without_write_the_yaml_stays_as_it_is(tmp_path, planner_yaml):
 def test_a_pour_that_never_does_what_it_should_is_not_written(tmp_path, planner_yaml, capsys):
     before = planner_yaml.read_text()
     assert main([str(trials_file(tmp_path, LESS, LESS)), "--write"]) == 2
-    assert "outcomes.direct.4.2.intended: is 0; expected a pour that can go as intended" in capsys.readouterr().err
+    assert "outcomes.linear.4.2.intended: is 0; expected a pour that can go as intended" in capsys.readouterr().err
     assert planner_yaml.read_text() == before
 
 
@@ -77,8 +77,8 @@ def test_a_pour_that_never_does_what_it_should_is_not_written(tmp_path, planner_
     [
         ("", "Expecting value"),
         ("[]", "expected a mapping"),
-        ('{"pour": "direct", "held": 4, "count": 2, "poured": 2}', "lost"),
-        (RIGHT.as_line().replace("direct", "sling"), "pour is 'sling'; expected lock or direct"),
+        ('{"pour": "linear", "held": 4, "count": 2, "poured": 2}', "lost"),
+        (RIGHT.as_line().replace("linear", "sling"), "pour is 'sling'; expected lock or linear or profiled"),
         (RIGHT.as_line().replace('"count": 2', '"count": 0'), "0 of 4 balls"),
         (RIGHT.as_line().replace('"held": 4', '"held": 1'), "2 of 1 balls"),
         (RIGHT.as_line().replace('"lost": 0', '"lost": 3'), "2 poured and 3 lost; expected no more than the tube held"),

@@ -28,9 +28,9 @@ def every_action_costs_one():
     none, one, hands = Measured(0.0), Measured(1.0), {"left": ("left", "center"), "right": ("center", "right")}
     each = {hand: dict.fromkeys(tubes, one) for hand, tubes in hands.items()}
     pours = {1: one, 2: one, 3: one, 4: Measured(600.0)}
-    ready, upright = {"direct": dict.fromkeys(TUBES, none)}, {"direct": none}
-    durations = Durations(PickDurations(each, each), each, ready, upright, none, {"direct": pours})
-    return replace(SETTINGS, hands_at_once=True, durations=durations, outcomes={"direct": SETTINGS.outcomes["direct"]})
+    ready, upright = {"linear": dict.fromkeys(TUBES, none)}, {"linear": none}
+    durations = Durations(PickDurations(each, each), each, ready, upright, none, {"linear": pours})
+    return replace(SETTINGS, hands_at_once=True, durations=durations, outcomes={"linear": SETTINGS.outcomes["linear"]})
 
 
 def every_failure_is_final():
@@ -39,10 +39,10 @@ def every_failure_is_final():
         return Outcome(share, lost=1.0 - share)
 
     table = {held: {count: outcome(held, count) for count in range(1, held + 1)} for held in range(1, 5)}
-    return replace(SETTINGS, outcomes={"lock": SETTINGS.outcomes["lock"], "direct": table})
+    return replace(SETTINGS, outcomes={"lock": SETTINGS.outcomes["lock"], "linear": table})
 
 
-def solve_for(goals, settings, method="direct", uncertain=True):
+def solve_for(goals, settings, method="linear", uncertain=True):
     """Solve for some goals only, which takes a moment where all of them take seconds."""
     graph = replace(state_graph(), representatives=np.array([state_graph().numbers[goal.tubes] for goal in goals]))
     return solve(graph, duration_prices(settings, method), outcome_shares(settings, method) if uncertain else None)
@@ -121,7 +121,7 @@ def play(planner, state, goal, chance):
 
 def test_games_by_the_surest_plan_are_solved_as_often_as_it_says(planner_for):
     goal, games, chance = State.parse("GR|PG|RP"), 2000, random.Random(8)
-    planner = planner_for(goal, "surest", "direct")
+    planner = planner_for(goal, "surest", "linear")
     plan = planner.plan(START, goal)
     ends = [play(planner, START, goal, chance) for _ in range(games)]
     solved = sum(state == goal for state, _ in ends) / games
@@ -140,8 +140,8 @@ def test_what_to_pour_next_follows_the_plan_and_ends_at_the_goal():
 
 
 def test_a_pour_may_end_one_ball_short_or_one_ball_over_or_beside_the_tubes(planner_for):
-    planner = planner_for(START, "surest", "direct")
-    outcome = SETTINGS.outcomes["direct"][4][2]
+    planner = planner_for(START, "surest", "linear")
+    outcome = SETTINGS.outcomes["linear"][4][2]
     results = planner.results_of(Pour("left", "right", 2), State.parse("RRGG|PP|"), START)
     assert {None if r.state is None else str(r.state): r.share for r in results} == {
         "RRG|PP|G": outcome.fewer, "R|PP|GGR": outcome.more, None: outcome.lost,
@@ -154,7 +154,7 @@ def test_a_pour_may_end_one_ball_short_or_one_ball_over_or_beside_the_tubes(plan
 
 def test_what_a_pour_that_is_not_possible_may_end_in_is_not_told(planner_for):
     with pytest.raises(PourError, match="0 balls in the right tube"):
-        planner_for(START, "surest", "direct").results_of(Pour("right", "left"), State.parse("RRGG|PP|"), START)
+        planner_for(START, "surest", "linear").results_of(Pour("right", "left"), State.parse("RRGG|PP|"), START)
 
 
 def test_with_shorter_arms_plans_go_round_the_pair_they_cannot_take(planner_for):
@@ -179,8 +179,8 @@ def test_a_plan_that_would_never_end_if_pours_did_what_they_should_is_refused(pl
         return Outcome(1.0) if count == held else Outcome(0.1, more=0.9)
 
     table = {held: {count: outcome(held, count) for count in range(1, held + 1)} for held in range(1, 5)}
-    settings = replace(SETTINGS, outcomes={**SETTINGS.outcomes, "direct": table})
-    planner = planner_for(START, "surest", "direct", settings=settings)
+    settings = replace(SETTINGS, outcomes={**SETTINGS.outcomes, "linear": table})
+    planner = planner_for(START, "surest", "linear", settings=settings)
     start = State.parse("|GG|PPRR")
     for ask in (planner.plan, planner.pours):
         with pytest.raises(PlannerError, match=r"\|GG\|PPRR to RR\|GG\|PP: the surest way counts on pours that go wrong"):
@@ -191,5 +191,5 @@ def test_a_plan_that_would_never_end_if_pours_did_what_they_should_is_refused(pl
 def test_unknown_words_are_refused_with_those_that_are_known():
     with pytest.raises(PlannerError, match="strategy 'nicest', expected one of fewest, fastest, surest"):
         Planner("nicest")
-    with pytest.raises(PlannerError, match="way to pour 'upside', expected one of lock, direct"):
+    with pytest.raises(PlannerError, match="way to pour 'upside', expected one of lock, linear, profiled"):
         Planner("fastest", "upside")

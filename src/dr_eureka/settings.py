@@ -4,7 +4,7 @@ A node's yaml or ROS parameters arrive as nested dicts. `build` turns them into 
 behind never meets a missing, misspelt or impossible value. Limits stand beside the field they limit:
 
     step_m: float = field(metadata={"min": 0.0, "max": 0.05})
-    pour: str = field(default="lock", metadata={"choices": ("lock", "direct")})
+    pour: str = field(default="lock", metadata={"choices": ("lock", "linear")})
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from dr_eureka.behaviour.observation import Gaze, Look, Observation, Robot
 from dr_eureka.behaviour.part_in_play import PartInPlay
 from dr_eureka.behaviour.plan_parts import next_part
 from dr_eureka.behaviour.report import ActionRecord, GameCode, GameReport, Listener, Phase
-from dr_eureka.control.codes import EngineState
+from dr_eureka.control.codes import EngineCode, EngineState
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.actions import actions_for
 from dr_eureka.game.planner import Planner
@@ -31,7 +31,7 @@ class GameFlow:
     What the tubes hold is seen before each game, never believed. `goal` replaces the card of the first game. With
     `confirm_card` a person must confirm or correct what was read from a card before the robot goes on. The pours of a plan
     are carried out in parts. What the tubes hold after each is looked at, and if a pour went wrong, the rest is planned
-    from what was seen. A ball that is in no tube ends the game. Without a `robot` (a
+    from what was seen; so it is after a grasp that failed. A ball that is in no tube ends the game. Without a `robot` (a
     replayed recording) nothing is commanded and nothing asked: every image is looked at, for the card first and then for the
     tubes, and the game ends when both are found.
     """
@@ -245,10 +245,21 @@ class GameFlow:
         if len(self._game.actions) > begun:
             self._listener.on_report(self.report())
         if isinstance(outcome, Failure):
-            self.fail(outcome.code, outcome.message)
+            if outcome.code == GameCode.ENGINE_FAULT and self._now.engine.code in EngineCode.PUT_DOWN:
+                self._look_again(outcome)
+            else:
+                self.fail(outcome.code, outcome.message)
         elif outcome:
             self._pours_ahead = self._playing.left_out + self._pours_ahead
             self._begin_tube_look(Phase.CHECKING, self._settings.check_limit)
+
+    def _look_again(self, fault: Failure) -> None:
+        """Let what the tubes hold be looked at after a fault of a hand, and the rest planned from that; not without end."""
+        if self._game.replans == self._settings.most_replans:
+            self.fail(fault.code, f"{fault.message}, after {self._game.replans} replans")
+            return
+        self._listener.on_fault(fault.message)
+        self._begin_tube_look(Phase.CHECKING, self._settings.check_limit)
 
     def _check(self) -> None:
         found = self._found_tubes()

@@ -21,7 +21,7 @@ class PartInPlay:
     After each pour but the last it looks at the tubes in the hands; if a pour went wrong, `part` ends there, and `left_out`
     are the pours that were not made.
 
-    `places` are `vision.tubes.TubePlace` by name, `method` is lock or direct, `game_s` tells the robot time since the game
+    `places` are `vision.tubes.TubePlace` by name, `method` is lock, linear or profiled, `game_s` tells the robot time since the game
     began [s].
     """
 

@@ -118,5 +118,8 @@ class Listener(Protocol):
     def on_surprise(self, expected: State, seen: State) -> None:
         """The tubes hold something else than the pours should have led to; a new plan follows."""
 
+    def on_fault(self, message: str) -> None:
+        """A grasp failed, and the robot has put down what it held; a look and a new plan follow."""
+
     def on_report(self, report: GameReport) -> None:
         """Phase, code or action changed."""

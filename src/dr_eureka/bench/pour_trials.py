@@ -2,9 +2,9 @@
 
 A file of trials has one JSON object a line, such as
 
-    {"pour": "direct", "held": 4, "count": 2, "poured": 2, "lost": 0}
+    {"pour": "profiled", "held": 4, "count": 2, "poured": 2, "lost": 0}
 
-for a direct pour of 2 balls out of a tube with 4, of which 2 arrived and none fell beside the tubes.
+for a profiled pour of 2 balls out of a tube with 4, of which 2 arrived and none fell beside the tubes.
 """
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class PourTrialError(DrEurekaError):
 
 @dataclass(frozen=True)
 class PourTrial:
-    """A pour of `count` balls by lock or direct out of a tube that held `held`: how many were poured over, how many lost."""
+    """A pour of `count` balls by one of the ways to pour out of a tube that held `held`: how many were poured over, how many lost."""
 
     pour: str
     held: int = field(metadata=_BALLS)

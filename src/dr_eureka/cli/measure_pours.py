@@ -49,8 +49,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="measure_pours",
         description=f"Count how pours ended in trials, beside the shares that {PLANNER_FILE} says.",
-        epilog='A line of TRIALS is one pour: {"pour": "direct", "held": 4, "count": 2, "poured": 2, "lost": 0} for a '
-        "direct pour of 2 balls out of a tube that held 4, of which 2 arrived and none fell beside the tubes.",
+        epilog='A line of TRIALS is one pour: {"pour": "profiled", "held": 4, "count": 2, "poured": 2, "lost": 0} for a '
+        "profiled pour of 2 balls out of a tube that held 4, of which 2 arrived and none fell beside the tubes.",
     )
     parser.add_argument("trials", metavar="TRIALS", nargs="+", type=Path, help="file of pours, one JSON object a line")
     parser.add_argument("--write", action="store_true", help=f"write what was counted into {PLANNER_FILE}; comments stay")

@@ -8,7 +8,7 @@ import numpy as np
 
 from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.codes import ControlError
-from dr_eureka.control.trajectory import MINIMUM_JERK_PEAK_SPEED, JointTrajectory, MotionLimits
+from dr_eureka.control.trajectory import JointTrajectory, MotionLimits
 from dr_eureka.kinematics.arms import arm_joint_names, mirror
 from dr_eureka.kinematics.hybrid import HybridSettings, HybridSolver, IkCode, IkResult
 from dr_eureka.kinematics.network import ArmNetwork
@@ -45,6 +45,14 @@ class Arm:
         """Pick this arm's joint angles (7,) out of all joints'."""
         return np.array([joints[name] for name in self.joints])
 
+    def as_drawn(self, angles: np.ndarray) -> np.ndarray:
+        """Return the angles (7,) at which an arm as drawn stands as this one does; lengths of links apart."""
+        return angles + np.array(self._calibration.joint_offsets)
+
+    def stretches(self) -> dict[str, float]:
+        """Return how much farther [m] each joint sits from the one before it (the first: from base) than drawn."""
+        return dict(zip(self.joints, self._calibration.link_stretches))
+
     def pose(self, joints: Mapping[str, float]) -> np.ndarray:
         """Return base_from_end (4, 4) for measured joints."""
         return self.forward(self.positions(joints))
@@ -69,14 +77,22 @@ class Arm:
             raise ControlError(code, f"{self.hand} hand cannot reach {what}, end link at {place} m in base: {result.code}, {result.reason}")
         return result.joints
 
-    def move(self, start: np.ndarray, end: np.ndarray, limits: MotionLimits) -> JointTrajectory:
-        """Return a straight joint-space trajectory."""
-        return JointTrajectory.within(np.array([start, end]), limits)
+    def move(self, start: np.ndarray, end: np.ndarray, limits: MotionLimits, at_least: float = 0.0) -> JointTrajectory:
+        """Return a straight joint-space trajectory that takes `at_least` [s]."""
+        return JointTrajectory.within(np.array([start, end]), limits, at_least=at_least)
 
     def glide(
-        self, start: np.ndarray, end: np.ndarray, spacing: float, limits: MotionLimits, code: str, what: str, rest: np.ndarray | None = None
+        self,
+        start: np.ndarray,
+        end: np.ndarray,
+        spacing: float,
+        limits: MotionLimits,
+        code: str,
+        what: str,
+        rest: np.ndarray | None = None,
+        hand_speed: float = np.inf,
     ) -> JointTrajectory:
-        """Return a trajectory on which the hand moves straight and turns evenly to a pose (4, 4), at `limits`.
+        """Return a trajectory on which the hand moves straight, at most at `hand_speed` [m/s], and turns evenly to a pose (4, 4).
 
         Poses are solved every `spacing` [m] of the way. At a constant height the hand passes over standing tubes, which a straight
         line in joint space does not promise.
@@ -95,7 +111,8 @@ class Arm:
             pose = transform(rotation_about(axis, share * angle) @ begin[:3, :3], begin[:3, 3] + share * shift)
             result = self._solver.solve(guess, self._calibration.commanded(pose), rest=guess, restarts=0)
             points.append(self._checked(result, pose, code, what))
-        return JointTrajectory.within(np.array(points), limits)
+        share_speed = hand_speed / max(float(np.linalg.norm(shift)), 1e-6)
+        return JointTrajectory.within(np.array(points), limits, share_speed)
 
     def line(
         self, start: np.ndarray, translation: np.ndarray, spacing: float, hand_speed: float, limits: MotionLimits, code: str, what: str
@@ -103,6 +120,4 @@ class Arm:
         """Return a trajectory that moves the hand straight by a translation (3,) [m], orientation kept, at most at `hand_speed` [m/s]."""
         end = self.forward(start)
         end[:3, 3] += translation
-        trajectory = self.glide(start, end, spacing, limits, code, what, rest=start)
-        slowest = MINIMUM_JERK_PEAK_SPEED * float(np.linalg.norm(translation)) / hand_speed
-        return trajectory if trajectory.duration >= slowest else JointTrajectory(trajectory.points, slowest)
+        return self.glide(start, end, spacing, limits, code, what, start, hand_speed)

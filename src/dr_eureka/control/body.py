@@ -10,11 +10,17 @@ import numpy as np
 from dr_eureka.control.arm import Arm
 from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.codes import ControlError, EngineCode
+from dr_eureka.control.collision import CollisionChecker, Hit, Tubes
+from dr_eureka.control.motion import Follow
 from dr_eureka.control.port import grip_joint
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.game.hands import HANDS
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.pieces import Pieces
+
+# [s] how finely a motion is sampled before it is checked for collisions: at its fastest 10 mm of the hand at most. A motion
+# that is asked to take longer than this many samples is slow, and is sampled more coarsely.
+_SAMPLE_S, _MOST_SAMPLES = 0.002, 5000
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,7 @@ class Body:
     settings: ControlSettings
     pieces: Pieces
     arms: dict[str, Arm]
+    collisions: CollisionChecker
     places: dict[str, np.ndarray] = field(default_factory=dict)
     held: dict[str, Held] = field(default_factory=dict)
     joints: Mapping[str, float] = field(default_factory=dict)
@@ -47,11 +54,20 @@ class Body:
     ) -> Body:
         """Make the body with its two arms; one without a calibration is as drawn."""
         arms = {hand: Arm(hand, settings.kinematics, network, calibrations.get(hand)) for hand in HANDS}
-        return cls(settings, pieces, arms)
+        return cls(settings, pieces, arms, CollisionChecker(settings.collision, pieces, arms))
 
     def commanded(self, hand: str) -> np.ndarray:
         """Return the arm's joint angles (7,) as last commanded: where the next trajectory must start."""
         return self.arms[hand].positions(self.goals)
+
+    def hit(self, motion: Follow) -> Hit | None:
+        """Return where a motion that begins now would bring two bodies too near to one another, or None."""
+        samples = min(max(2, int(np.ceil(motion.duration / _SAMPLE_S)) + 1), _MOST_SAMPLES)
+        times = np.linspace(0.0, motion.duration, samples)
+        # Fingers that a tube stops are where they are measured, not where they are sent.
+        grips = {grip_joint(hand): self.joints[grip_joint(hand)] for hand in HANDS}
+        tubes = Tubes(self.places, {hand: (held.tube, held.end_from_tube) for hand, held in self.held.items()})
+        return self.collisions.first_hit({**self.goals, **grips}, times, motion.sampled(times), tubes, motion.may_touch)
 
     def place_of(self, tube: str) -> np.ndarray:
         """Return where a tube stands, foot (3,) [m] in base; raise ControlError if it is not known to stand anywhere."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dr_eureka.errors import DrEurekaError
 
-POUR_METHODS = ("lock", "direct")
+POUR_METHODS = ("lock", "linear", "profiled")
 
 
 class EngineState:
@@ -28,15 +28,19 @@ class EngineCode:
     OUT_OF_LIMITS = "OUT_OF_LIMITS"
     UNREACHABLE_TUBE = "UNREACHABLE_TUBE"
     UNREACHABLE_POUR = "UNREACHABLE_POUR"
+    COLLISION = "COLLISION"
     GRASP_EMPTY = "GRASP_EMPTY"
     TUBE_SLIPPED = "TUBE_SLIPPED"
     TRACKING_ERROR = "TRACKING_ERROR"
     JOINT_STATES_LOST = "JOINT_STATES_LOST"
     INTERNAL_ERROR = "INTERNAL_ERROR"
 
+    PUT_DOWN = (GRASP_EMPTY, TUBE_SLIPPED)
+    """Faults after which the engine puts down what it still holds and goes home: one can look, and try again."""
+
     ALL = (
         OK, BUSY, STOPPED, UNKNOWN_JOINT, INVALID_VALUE, INVALID_ACTION, OUT_OF_LIMITS, UNREACHABLE_TUBE,
-        UNREACHABLE_POUR, GRASP_EMPTY, TUBE_SLIPPED, TRACKING_ERROR, JOINT_STATES_LOST, INTERNAL_ERROR,
+        UNREACHABLE_POUR, COLLISION, GRASP_EMPTY, TUBE_SLIPPED, TRACKING_ERROR, JOINT_STATES_LOST, INTERNAL_ERROR,
     )
 
 

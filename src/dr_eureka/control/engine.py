@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from math import isfinite
 from types import MappingProxyType
@@ -13,14 +14,14 @@ from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.body import Body
 from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode, EngineState
 from dr_eureka.control.limits import CommandLimiter, JointLimit
-from dr_eureka.control.motion import Follow, Motion, Wait
-from dr_eureka.control.picking import go_home, pick, place
+from dr_eureka.control.motion import Brake, Follow, Motion
 from dr_eureka.control.port import CONTROLLED_JOINTS, grip_joint
-from dr_eureka.control.pouring import pour, raise_tubes
 from dr_eureka.control.settings import ControlSettings
+from dr_eureka.control.strategy import Script, check_actions, strategy
 from dr_eureka.control.trajectory import JointTrajectory
 from dr_eureka.game.actions import Action
 from dr_eureka.game.hands import HANDS
+from dr_eureka.game.state import TUBES
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.pieces import Pieces
 
@@ -32,6 +33,7 @@ GRIP_RANGE = (0.0, 1.15)
 class EngineStatus:
     """What the engine is doing, or why it stopped; `action_index` counts the strategy's actions from 0, -1 outside one.
 
+    `at_once`: how many actions, up to that one, are under way at the same time; 0 outside a strategy.
     `paused`: it holds both tubes after a pour, for somebody to look at them, until `go_on`.
     """
 
@@ -40,11 +42,15 @@ class EngineStatus:
     action_index: int
     message: str
     paused: bool = False
+    at_once: int = 0
 
 
 class ControlEngine:
     """Tick me with the time and the joints, write what I return; the very code for the robot and for the simulator.
 
+    Motions are worked out, and checked for collisions, in a thread beside the control cycle. With `wait_for_plans` a cycle
+    lasts until the next motion is there, so that a simulation does not depend on how fast the machine is; without, the robot
+    holds meanwhile and every cycle is answered at once.
     Source: paper Figure 5 (Control Engine), 3.4 and 3.5.
     """
 
@@ -54,6 +60,7 @@ class ControlEngine:
         pieces: Pieces,
         network: ArmNetwork | None = None,
         calibrations: Mapping[str, ArmCalibration] = MappingProxyType({}),
+        wait_for_plans: bool = True,
     ):
         self.body = Body.build(settings, pieces, network, calibrations)
         self.settings = settings
@@ -62,14 +69,14 @@ class ControlEngine:
             {name: JointLimit(low, high, settings.speeds.hardware) for name, (low, high) in self.ranges.items()},
             settings.speeds.longest_step,
         )
-        self._script: Iterator[Motion] | None = None
-        self._motion: Motion | None = None
+        self._wait_for_plans = wait_for_plans
+        self._planner = ThreadPoolExecutor(max_workers=1, thread_name_prefix="planner")
+        self._planned: Future[Motion | None] | None = None
+        self._script: Script | None = None
+        self._motion: Motion | Brake | None = None
         self._motion_start = 0.0
-        self._now = 0.0
         self._last_tick: float | None = None
         self._lagging_since: dict[str, float] = {}
-        self._action_index = -1
-        self._put_down = False
         self.status = EngineStatus(EngineState.IDLE, EngineCode.OK, -1, "ready")
         self.durations: list[tuple[int, float, float]] = []
         """(action index, start, end) [s] of every finished action of the strategy."""
@@ -87,40 +94,29 @@ class ControlEngine:
         balls: Mapping[str, int],
         method: str = "lock",
         pause_after_pours: bool = False,
+        hands_at_once: bool = False,
     ) -> None:
         """Begin a strategy. Raises ControlError (BUSY, INVALID_VALUE, INVALID_ACTION).
 
-        Tubes stand with their feet at `places` (3,) [m] in base and hold that many `balls` each; `method` is one of POUR_METHODS.
-        With `pause_after_pours` it waits for `go_on` after each pour but the last.
+        Tubes stand with their feet at `places` (3,) [m] in base and hold that many `balls` each; `method` is one of
+        POUR_METHODS. With `pause_after_pours` it waits for `go_on` after each pour but the last. With `hands_at_once`,
+        neighbouring picks and places of different hands are carried out together, as far as neither hand is in the other's way.
         """
         self._refuse_when_busy()
         if method not in POUR_METHODS:
             raise ControlError(EngineCode.INVALID_ACTION, f"pour method {method!r}, expected one of {', '.join(POUR_METHODS)}")
         for tube, foot in places.items():
+            if tube not in TUBES:
+                raise ControlError(EngineCode.INVALID_VALUE, f"tube {tube!r}, expected some of {', '.join(TUBES)}")
             if len(foot) != 3 or not all(isfinite(value) for value in foot):
                 raise ControlError(EngineCode.INVALID_VALUE, f"place of tube {tube!r} is {list(foot)}, expected three finite metres")
-        self._check_actions(actions, places)
+        check_actions(actions, places)
         self._check_hands_are_empty()
         torso = self.body.joints.get("torso_y", 0.0)
         if abs(torso) > self.settings.guards.torso:
             raise ControlError(EngineCode.OUT_OF_LIMITS, f"torso_y is at {torso:.3f} rad, expected at most {self.settings.guards.torso} from 0")
         self.body.places = {tube: np.array(foot, dtype=float) for tube, foot in places.items()}
-        self.durations = []
-        self._begin(self._strategy(tuple(actions), dict(balls), method, pause_after_pours), "strategy accepted")
-
-    @staticmethod
-    def _check_actions(actions: Sequence[Action], places: Mapping[str, Sequence[float]]) -> None:
-        """Raise ControlError for an action that names an unknown kind, a hand the robot lacks or a tube without a place."""
-        for index, action in enumerate(actions):
-            pours = action.kind == "pour"
-            hands = (action.hand, action.target_hand) if pours else (action.hand,)
-            tubes = (action.tube, action.target_tube) if pours else (action.tube,)
-            for name, known in (((action.kind,), ("pick", "place", "pour")), (hands, HANDS), (tubes, tuple(places))):
-                strange = [word for word in name if word not in known]
-                if strange:
-                    raise ControlError(
-                        EngineCode.INVALID_ACTION, f"action {index} ({action}): {strange[0]!r}, expected one of {', '.join(known) or 'none'}"
-                    )
+        self._begin(strategy(self.body, actions, balls, method, pause_after_pours, hands_at_once))
 
     def _check_hands_are_empty(self) -> None:
         """Raise ControlError while a tube is known to be held, or while fingers stand where only a tube stops them."""
@@ -152,23 +148,26 @@ class ControlEngine:
         self._refuse_when_busy()
         if not self.body.goals:
             raise ControlError(EngineCode.JOINT_STATES_LOST, "no joint state has been received yet")
-        self._begin(self._joint_move(dict(goals), duration), f"moving {', '.join(goals)}")
+        self._begin(Script(f"moving {', '.join(goals)}", self._joint_move(dict(goals), duration)))
 
     def go_on(self, put_down: bool) -> None:
         """End a pause: carry the strategy on, or leave it and put down what is held. Raises ControlError (INVALID_ACTION)."""
         if not self.status.paused:
             raise ControlError(EngineCode.INVALID_ACTION, f"no pour waits to be looked at: {self.status.message}")
+        self._script.paused, self._script.put_down = False, put_down
         self.status = replace(self.status, paused=False)
-        self._put_down = put_down
 
     def stop(self) -> None:
-        """Stop in this cycle and hold; what is held stays held."""
-        self._script = self._motion = None
-        self.status = EngineStatus(EngineState.IDLE, EngineCode.STOPPED, self._action_index, "stopped on request")
+        """Leave what is under way: from the next cycle on the joints brake on their path, then hold; hands keep their tubes."""
+        self._halt()
+        self.status = replace(
+            self.status, state=EngineState.IDLE, code=EngineCode.STOPPED, message="stopped on request", paused=False
+        )
 
     def lose(self, message: str) -> None:
         """Note that joint states no longer arrive; the robot holds. When they come back, holding starts from what they say."""
         self._fail(EngineCode.JOINT_STATES_LOST, message)
+        self._motion = None
         self.body.goals = {}
 
     def tick(self, time_s: float, joints: Mapping[str, float]) -> dict[str, float]:
@@ -177,25 +176,34 @@ class ControlEngine:
         if missing or not all(isfinite(joints[name]) for name in CONTROLLED_JOINTS):
             bad = missing or [name for name in CONTROLLED_JOINTS if not isfinite(joints[name])]
             self._fail(EngineCode.INVALID_VALUE, f"joint state lacks a finite position of {', '.join(bad)}")
-            return dict(self.body.goals)
-        self.body.joints = joints
+        else:
+            self.body.joints = joints
+        if not self.body.joints:
+            return {}
         if not self.body.goals:
+            joints = self.body.joints
             self.body.goals = {name: float(joints[name]) for name in CONTROLLED_JOINTS}
             self._limiter.reset(time_s, self.body.goals)
         try:
             self._skip_gap(time_s)
             self._check_tracking(time_s)
             self._advance(time_s)
-            wanted = dict(self.body.goals)
-            if self._motion is not None:
-                wanted.update(self._motion.goals(time_s - self._motion_start))
-            self.body.goals.update(self._limiter.apply(time_s, wanted))
+            self._command(time_s)
         except ControlError as error:
             self._fail(error.code, error.message)
         except Exception as error:
             # Whatever went wrong in planning a motion, the robot holds, and nobody is told that all went well.
             self._fail(EngineCode.INTERNAL_ERROR, f"{type(error).__name__}: {error}")
         return dict(self.body.goals)
+
+    def _command(self, time_s: float) -> None:
+        """Move the goals to where the motion under way has them now, as far as the joints may go."""
+        moved = self._motion.goals(time_s - self._motion_start) if self._motion is not None else {}
+        try:
+            self.body.goals.update(self._limiter.apply(time_s, {**self.body.goals, **moved}))
+        except ControlError:
+            self._motion = None  # not even to brake on it
+            raise
 
     def _skip_gap(self, time_s: float) -> None:
         """Let a motion go on where it was when joint states were missing for a while, or the clock jumped."""
@@ -205,73 +213,60 @@ class ControlEngine:
         self._last_tick = time_s
 
     def _advance(self, time_s: float) -> None:
-        """Take the next motion of the script when the present one is over."""
+        """Have the next motion of the script planned when the present one is over, and take it once it is there."""
+        if self._motion is not None:
+            if not self._motion.over(time_s - self._motion_start, self.body.joints):
+                return
+            # A motion that ended between two ticks still ends exactly at its last point.
+            self._command(time_s)
+            self._motion = None
         if self._script is None:
             return
-        if self._motion is not None and not self._motion.over(time_s - self._motion_start, self.body.joints):
-            return
-        if self._motion is not None:
-            # A motion that ended between two ticks still ends exactly at its last point.
-            self.body.goals.update(self._limiter.apply(time_s, self.body.goals | self._motion.goals(time_s - self._motion_start)))
-        self._now = time_s
-        self._motion = next(self._script, None)
-        self._motion_start = time_s
+        if self._planned is None:
+            self._script.now = time_s
+            self._planned = self._planner.submit(self._next_motion, self._script)
+        if self._wait_for_plans or self._planned.done():
+            planned, self._planned = self._planned, None
+            self._take(planned, time_s)
+
+    def _next_motion(self, script: Script) -> Motion | None:
+        """Work out the next motion of a script, None at its end; raises ControlError COLLISION and what the skills raise."""
+        motion = next(script.motions, None)
+        hit = self.body.hit(motion) if isinstance(motion, Follow) else None
+        if hit is not None:
+            raise ControlError(EngineCode.COLLISION, str(hit))
+        return motion
+
+    def _take(self, planned: Future[Motion | None], time_s: float) -> None:
+        """Begin a planned motion, or end the script; raises what planning raised."""
+        script = self._script
+        wait([planned])
+        self.durations = script.durations
+        self.status = EngineStatus(
+            EngineState.BUSY, EngineCode.OK, script.action_index, script.message, script.paused, script.at_once
+        )
+        self._motion, self._motion_start = planned.result(), time_s
         if self._motion is None:
             self._script = None
-            self.status = EngineStatus(EngineState.DONE, EngineCode.OK, self._action_index, "done")
-
-    def _strategy(self, actions: tuple[Action, ...], balls: dict[str, int], method: str, pauses: bool) -> Iterator[Motion]:
-        body = self.body
-        homes = dict(body.places)
-        self._put_down = False
-        yield from go_home(body)
-        for index, action in enumerate(actions):
-            self._action_index, started = index, self._now
-            self.status = EngineStatus(EngineState.BUSY, EngineCode.OK, index, str(action))
-            if body.pour_ready is not None and not (action.kind == "pour" and body.pour_ready == (action.hand, method)):
-                yield from raise_tubes(body)
-            if action.kind == "pick":
-                yield from pick(body, action.hand, action.tube)
-            elif action.kind == "place":
-                yield from place(body, action.hand, action.tube, homes[action.tube])
-            elif action.kind == "pour":
-                body.held_in(action.hand, action.tube)
-                body.held_in(action.target_hand, action.target_tube)
-                if not 1 <= action.count <= balls.get(action.tube, 0):
-                    raise ControlError(
-                        EngineCode.INVALID_ACTION, f"{action}: the tube holds {balls.get(action.tube, 0)} balls as far as is known"
-                    )
-                yield from pour(body, action.hand, action.target_hand, method, balls[action.tube], action.count)
-                balls[action.tube] -= action.count
-                balls[action.target_tube] = balls.get(action.target_tube, 0) + action.count
-            else:
-                raise ControlError(EngineCode.INVALID_ACTION, f"action {index} is {action.kind!r}, expected pick, place or pour")
-            self.durations.append((index, started, self._now))
-            if pauses and action.kind == "pour" and any(later.kind == "pour" for later in actions[index + 1 :]):
-                self.status = replace(self.status, paused=True)
-                yield Wait(lambda *_: not self.status.paused, self.settings.guards.pause_seconds)
-                self.status = replace(self.status, paused=False)
-            if self._put_down:
-                yield from raise_tubes(body)
-                for hand, held in tuple(body.held.items()):
-                    yield from place(body, hand, held.tube, homes[held.tube])
-                break
-        yield from go_home(body)
+            self.status = replace(self.status, state=EngineState.DONE, message="done")
 
     def _joint_move(self, goals: dict[str, float], duration: float) -> Iterator[Motion]:
         names = tuple(goals)
         points = np.array([[self.body.goals[name] for name in names], [goals[name] for name in names]])
-        quickest = JointTrajectory.within(points, self.settings.speeds.move)
-        yield Follow(((names, JointTrajectory(points, max(duration, quickest.duration))),))
+        yield Follow(((names, JointTrajectory.within(points, self.settings.speeds.move, at_least=duration)),))
 
-    def _begin(self, script: Iterator[Motion], message: str) -> None:
-        self._script, self._motion, self._action_index = script, None, -1
-        self._lagging_since = {}
-        self.status = EngineStatus(EngineState.BUSY, EngineCode.OK, -1, message)
+    def _begin(self, script: Script) -> None:
+        self._script, self._lagging_since = script, {}
+        self.durations = script.durations
+        self.status = EngineStatus(EngineState.BUSY, EngineCode.OK, -1, script.message)
 
     def _refuse_when_busy(self) -> None:
         if self._script is not None:
             raise ControlError(EngineCode.BUSY, f"busy with: {self.status.message}")
+        if self._planned is not None:
+            # A stop leaves what was just being planned; the planner must be done with the body before anything new begins.
+            wait([self._planned])
+            self._planned = None
 
     def _check_tracking(self, time_s: float) -> None:
         """Raise ControlError when an arm or head joint stays away from its goal: blocked, limp or colliding."""
@@ -287,6 +282,15 @@ class ControlEngine:
 
     def _fail(self, code: str, message: str) -> None:
         if self.status.code != code or self.status.state != EngineState.FAULT:
-            self.status = EngineStatus(EngineState.FAULT, code, self._action_index, message)
-        self._script = self._motion = None
+            self.status = replace(self.status, state=EngineState.FAULT, code=code, message=message, paused=False)
+        self._halt()
 
+    def _halt(self) -> None:
+        """Leave the script; a motion that is under way is braked on its path."""
+        self._script = None
+        if isinstance(self._motion, Brake):
+            return
+        elapsed = (self._last_tick or 0.0) - self._motion_start
+        braking = isinstance(self._motion, Follow) and not self._motion.over(elapsed, self.body.joints)
+        self._motion = Brake(self._motion, elapsed, self.settings.speeds.stop) if braking else None
+        self._motion_start = self._last_tick or 0.0

@@ -5,16 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Callable, Mapping
 
-from dr_eureka.control.trajectory import JointTrajectory, SampledTrajectory
+import numpy as np
 
-Trajectory = JointTrajectory | SampledTrajectory
+from dr_eureka.control.trajectory import JointTrajectory, SampledTrajectory, TrajectorySequence
+
+Trajectory = JointTrajectory | SampledTrajectory | TrajectorySequence
+Track = tuple[tuple[str, ...], Trajectory]
 
 
 @dataclass(frozen=True)
 class Follow:
-    """Let groups of joints follow trajectories, all starting together; over when the longest is."""
+    """Let groups of joints follow trajectories, all starting together; over when the longest is.
 
-    tracks: tuple[tuple[tuple[str, ...], Trajectory], ...]
+    `may_touch`: pairs of bodies whose contact is what the motion is for, such as a finger and the tube that it closes on.
+    """
+
+    tracks: tuple[Track, ...]
+    may_touch: frozenset[frozenset[str]] = frozenset()
 
     @property
     def duration(self) -> float:
@@ -23,14 +30,45 @@ class Follow:
 
     def goals(self, elapsed: float) -> dict[str, float]:
         """Return the joint goals [rad] after `elapsed` seconds."""
+        return {name: float(position) for name, position in self.sampled(elapsed).items()}
+
+    def sampled(self, times: np.ndarray | float) -> dict[str, np.ndarray]:
+        """Return the joint goals (...) [rad] at times (...) [s] after the start, by name."""
         return {
-            name: float(position)
+            name: positions
             for names, trajectory in self.tracks
-            for name, position in zip(names, trajectory.at(elapsed))
+            for name, positions in zip(names, np.moveaxis(trajectory.at(times), -1, 0))
         }
 
     def over(self, elapsed: float, joints: Mapping[str, float]) -> bool:
         """Tell whether the motion's time is up."""
+        return elapsed >= self.duration
+
+
+class Brake:
+    """Bring a motion to rest on its own path: its clock runs slower evenly until it stands still.
+
+    No joint slows down harder than `deceleration` [rad/s^2] besides what the motion itself asks of it.
+    """
+
+    def __init__(self, motion: Follow, elapsed: float, deceleration: float):
+        self._motion, self._began = motion, elapsed
+        # The clock stops after half of the braking time, so only the speeds up to there matter.
+        step, seconds = 0.001, 0.0
+        for _ in range(2):
+            times = elapsed + np.arange(0.0, 0.5 * seconds + 2.0 * step, step)
+            speed = max(float(np.abs(np.diff(values)).max()) for values in motion.sampled(times).values()) / step
+            seconds = speed / deceleration
+        self.duration = seconds
+
+    def goals(self, elapsed: float) -> dict[str, float]:
+        """Return the joint goals [rad] `elapsed` seconds after braking began."""
+        braked = min(elapsed, self.duration)
+        run = braked - 0.5 * braked**2 / self.duration if self.duration > 0.0 else 0.0
+        return self._motion.goals(self._began + run)
+
+    def over(self, elapsed: float, joints: Mapping[str, float]) -> bool:
+        """Tell whether all joints are at rest."""
         return elapsed >= self.duration
 
 

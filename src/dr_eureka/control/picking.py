@@ -8,6 +8,7 @@ import numpy as np
 
 from dr_eureka.control.body import Body, Held
 from dr_eureka.control.codes import ControlError, EngineCode
+from dr_eureka.control.collision import Pair, finger_links, tube_body
 from dr_eureka.control.grasp import UP, frame_along, hand_for_tube, level_hand, tube_in_hand
 from dr_eureka.control.motion import Follow, Motion, Wait, settled
 from dr_eureka.control.port import grip_joint
@@ -20,19 +21,30 @@ def _approach_yaw(body: Body, hand: str) -> float:
     return yaw if hand == "left" else -yaw
 
 
-def _fingers(body: Body, hand: str, angle: float) -> tuple[tuple[str], JointTrajectory]:
+def fingers(body: Body, hand: str, angle: float) -> tuple[tuple[str], JointTrajectory]:
     """Return the track of a `Follow` that brings a hand's fingers to an angle [rad]."""
     joint = grip_joint(hand)
-    return (joint,), JointTrajectory(np.array([[body.goals[joint]], [angle]]), body.settings.grip.travel_seconds)
+    return (joint,), JointTrajectory.lasting(np.array([[body.goals[joint]], [angle]]), body.settings.grip.travel_seconds)
 
 
-def _vertical(body: Body, hand: str, height: float, limits: MotionLimits, what: str) -> Follow:
+def vertical(
+    body: Body, hand: str, height: float, limits: MotionLimits, what: str, may_touch: frozenset[Pair] = frozenset()
+) -> Follow:
     """Return a straight vertical motion of a hand by `height` [m]."""
-    arm, pick = body.arms[hand], body.settings.pick
-    line = arm.line(
-        body.commanded(hand), height * UP, pick.way_point_spacing, body.settings.speeds.line, limits, EngineCode.UNREACHABLE_TUBE, what
-    )
-    return Follow(((arm.joints, line),))
+    arm, start = body.arms[hand], body.commanded(hand)
+    spacing, speed = body.settings.pick.way_point_spacing, body.settings.speeds.line
+    line = arm.line(start, height * UP, spacing, speed, limits, EngineCode.UNREACHABLE_TUBE, what)
+    return Follow(((arm.joints, line),), may_touch)
+
+
+def grasp_contacts(hand: str, tube: str) -> frozenset[Pair]:
+    """Return the contacts that closing and opening the fingers of a hand on a tube are for."""
+    return frozenset(frozenset((tube_body(tube), finger)) for finger in finger_links(hand))
+
+
+def _standing(body: Body, tube: str) -> frozenset[Pair]:
+    """Return the contacts of a tube with what it may be put down on."""
+    return frozenset(frozenset((tube_body(tube), name)) for name in body.settings.collision.furniture)
 
 
 def _level_way(body: Body, hand: str, end: np.ndarray, limits: MotionLimits, what: str, rest: np.ndarray) -> JointTrajectory:
@@ -42,10 +54,27 @@ def _level_way(body: Body, hand: str, end: np.ndarray, limits: MotionLimits, wha
 
 
 def go_home(body: Body) -> Iterator[Motion]:
-    """Bring both empty arms to the home posture, above the tubes and out of the camera's view."""
+    """Bring the empty hands to the home posture, above the tubes and out of the camera's view; a hand with a tube stays.
+
+    Where they cannot go at once and straight in joint space, they go one after the other, up first, then over the tubes.
+    """
     home = body.settings.postures.home
     limits = body.settings.speeds.move
-    yield Follow(tuple((arm.joints, arm.move(body.commanded(hand), arm.posture(home), limits)) for hand, arm in body.arms.items()))
+    empty = {hand: arm for hand, arm in body.arms.items() if hand not in body.held}
+    if not empty:
+        return
+    ways = [(arm.joints, arm.move(body.commanded(hand), arm.posture(home), limits)) for hand, arm in empty.items()]
+    at_once = Follow(tuple(ways))
+    if body.hit(at_once) is None:
+        yield at_once
+        return
+    for hand, arm in empty.items():
+        posture = arm.posture(home)
+        end = arm.forward(posture)
+        rise = end[2, 3] - arm.forward(body.commanded(hand))[2, 3]
+        if rise > 0.0:
+            yield vertical(body, hand, rise, limits, "home")
+        yield Follow(((arm.joints, _level_way(body, hand, end, limits, "home", posture)),))
 
 
 def pick(body: Body, hand: str, tube: str) -> Iterator[Motion]:
@@ -59,16 +88,16 @@ def pick(body: Body, hand: str, tube: str) -> Iterator[Motion]:
     rest = arm.posture(settings.postures.pick)
     over = level_hand(grasp_centre + settings.pick.lift * UP, _approach_yaw(body, hand), settings.pick.centre_beyond_end)
     way = _level_way(body, hand, over, settings.speeds.move, what, rest)
-    yield Follow(((arm.joints, way), _fingers(body, hand, settings.grip.open)))
-    yield _vertical(body, hand, -settings.pick.lift, settings.speeds.move, what)
+    yield Follow(((arm.joints, way), fingers(body, hand, settings.grip.open)))
+    yield vertical(body, hand, -settings.pick.lift, settings.speeds.move, what)
     yield Wait(settled(arm.joints), settings.grip.settle_seconds)
 
-    yield Follow((_fingers(body, hand, settings.grip.closed),))
+    yield Follow((fingers(body, hand, settings.grip.closed),), grasp_contacts(hand, tube))
     yield Wait(settled((grip_joint(hand),)), settings.grip.settle_seconds)
     body.check_grip(hand, EngineCode.GRASP_EMPTY, f"closed on tube {tube!r}")
     body.held[hand] = Held(tube, tube_in_hand(arm.pose(body.joints), foot))
     del body.places[tube]
-    yield _vertical(body, hand, settings.pick.lift, settings.speeds.carry, what)
+    yield vertical(body, hand, settings.pick.lift, settings.speeds.carry, what)
     body.check_grip(hand, EngineCode.TUBE_SLIPPED, f"lifted tube {tube!r}")
 
 
@@ -85,15 +114,15 @@ def place(body: Body, hand: str, tube: str, foot: np.ndarray) -> Iterator[Motion
     way = _level_way(body, hand, over, settings.speeds.carry, what, rest)
     yield Follow(((arm.joints, way),))
     body.check_grip(hand, EngineCode.TUBE_SLIPPED, f"over the place of tube {tube!r}")
-    yield _vertical(body, hand, -settings.pick.lift, settings.speeds.carry, what)
+    yield vertical(body, hand, -settings.pick.lift, settings.speeds.carry, what, _standing(body, tube))
     yield Wait(settled(arm.joints), settings.grip.settle_seconds)
 
     standing = (arm.pose(body.joints) @ held.end_from_tube)[:3, 3]
-    yield Follow((_fingers(body, hand, settings.grip.open),))
+    yield Follow((fingers(body, hand, settings.grip.open),), grasp_contacts(hand, tube))
     yield Wait(settled((grip_joint(hand),)), settings.grip.settle_seconds)
     del body.held[hand]
     body.places[tube] = np.array([standing[0], standing[1], foot[2]])
-    yield _vertical(body, hand, settings.pick.lift, settings.speeds.move, what)
+    yield vertical(body, hand, settings.pick.lift, settings.speeds.move, what)
     if all(tube in reach for reach in load_planner_settings().reach.values()):
         # The other hand may come for it next.
         home = arm.posture(settings.postures.home)

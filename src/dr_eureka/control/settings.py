@@ -14,8 +14,9 @@ _POSITIVE = {"min": 1e-6}
 
 @dataclass(frozen=True)
 class SpeedSettings:
-    """How fast the arms go: joint speeds [rad/s], accelerations [rad/s^2], hand speed on straight lines [m/s].
+    """How fast the arms go: joint speeds [rad/s], accelerations [rad/s^2], jerks [rad/s^3], a hand on straight lines [m/s].
 
+    `stop`: how hard joints slow down when a motion is broken off [rad/s^2].
     `longest_step` [s]: after a gap in the joint states, motions go on where they were, and one command moves no farther than this long.
     """
 
@@ -24,6 +25,7 @@ class SpeedSettings:
     move: MotionLimits
     carry: MotionLimits
     line: float = field(metadata={"min": 0.01, "max": 1.0})
+    stop: float = field(metadata={"min": 1.0, "max": 500.0})
 
 
 @dataclass(frozen=True)
@@ -71,30 +73,81 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class LockPourSettings:
-    """The lock-pour: where the lip is held and the keyframes after the ready pose."""
+    """The lock-pour: where the lip is held and the keyframes after the ready pose; angles in rad, lengths in m."""
 
     lip: LipPlace
+    undocked: float = field(metadata={"min": 0.0, "max": 0.05})
     ready_elevation: float
     ready_withdrawn: float
     keyframes: tuple[Keyframe, ...]
 
 
 @dataclass(frozen=True)
-class DirectPourSettings:
-    """The direct pour: a dip of the tube, timed by how many balls stay behind.
+class TiltLimits:
+    """How fast the pouring tube may tilt: rate [rad/s] and acceleration [rad/s^2]."""
 
-    `dip_seconds[k]` [s]: how long the tube is sent down when k balls are to stay; angles in rad, rates in rad/s and rad/s^2.
+    rate: float = field(metadata=_POSITIVE)
+    acceleration: float = field(metadata=_POSITIVE)
+
+
+@dataclass(frozen=True)
+class LinearPourSettings:
+    """The paper's direct pour: evenly from a ready to a pouring pose, cut at a step and back at once.
+
+    `return_steps[n][k]`: the step at which it turns back when k of n balls are to be poured; beyond `poses`, it waits at the
+    pouring pose. Angles in rad, lengths in m, `step_seconds` between two poses.
     """
 
     lip: LipPlace
+    undocked: float = field(metadata={"min": 0.0, "max": 0.05})
+    ready_elevation: float
+    ready_withdrawn: float
+    pouring_elevation: float
+    poses: int = field(metadata={"min": 1, "max": 10000})
+    step_seconds: float = field(metadata=_POSITIVE)
+    limits: TiltLimits
+    return_steps: dict[int, dict[int, int]]
+
+
+@dataclass(frozen=True)
+class ProfiledPourSettings:
+    """The direct pour that dips and returns as quickly as the wrist may, timed by how many balls stay behind.
+
+    `dip_seconds[k]` [s]: how long the tube is sent down when k balls are to stay. `hold_seconds`: how long it then stays at the
+    return elevation; `back_seconds`: from there to ready. Angles in rad, lengths in m.
+    """
+
+    lip: LipPlace
+    undocked: float = field(metadata={"min": 0.0, "max": 0.05})
     ready_elevation: float
     ready_withdrawn: float
     dip_elevation: float
     return_elevation: float
-    rate: float = field(metadata=_POSITIVE)
-    acceleration: float = field(metadata=_POSITIVE)
-    dip_seconds: tuple[float, ...]
+    limits: TiltLimits
+    dip_seconds: dict[int, float] = field(metadata=_POSITIVE)
     hold_seconds: float = field(metadata=_POSITIVE)
+    back_seconds: float = field(metadata=_POSITIVE)
+
+
+@dataclass(frozen=True)
+class Furniture:
+    """A box that stands in front of the robot, edges parallel to base: centre and size (x, y, z) [m]."""
+
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float] = field(metadata=_POSITIVE)
+
+
+@dataclass(frozen=True)
+class CollisionSettings:
+    """How near to one another things may come in a motion: lengths [m].
+
+    `margin`: the least distance; `horizon`: bodies farther apart than this are not looked at, so it also is how far the
+    robot may move between two looks where nothing is near.
+    """
+
+    margin: float = field(metadata={"min": 0.001, "max": 0.02})
+    horizon: float = field(metadata={"min": 0.02, "max": 0.5})
+    furniture: dict[str, Furniture]
 
 
 @dataclass(frozen=True)
@@ -119,8 +172,10 @@ class ControlSettings:
     postures: PostureSettings
     pour_place: PourPlace
     lock_pour: LockPourSettings
-    direct_pour: DirectPourSettings
+    linear_pour: LinearPourSettings
+    profiled_pour: ProfiledPourSettings
     guards: GuardSettings
+    collision: CollisionSettings
 
     @classmethod
     def from_mapping(cls, mapping: dict, where: str) -> ControlSettings:

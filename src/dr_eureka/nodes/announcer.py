@@ -94,6 +94,10 @@ class Announcer:
         """Log that a pour went wrong."""
         rospy.logwarn("tubes: they hold %s, expected %s: planning anew", seen, expected)
 
+    def on_fault(self, message: str) -> None:
+        """Log that a grasp failed."""
+        rospy.logwarn("%s: looking again", message)
+
     def on_report(self, report: GameReport) -> None:
         """Publish where the game stands, and log a new phase."""
         self._status.publish(messages.report_to_message(report, rospy.get_time()))

@@ -35,6 +35,7 @@ class EngineNodeSettings:
 
     joint_states_timeout: float = field(metadata={"min": 0.02, "max": 60.0})
     status_period: float = field(metadata={"min": 0.01, "max": 1.0})
+    wait_for_plans: bool
     default_pour: str = field(metadata={"choices": POUR_METHODS})
     arm_calibration: str
 
@@ -78,8 +79,14 @@ class ControlEngineNode:
     def serve(self) -> int:
         """Watch that joint states arrive, until shut down; return the exit code."""
         while not rospy.is_shutdown():
-            with self._lock:
-                self._check_alive()
+            if self._lock.acquire(timeout=self._settings.status_period):
+                try:
+                    self._check_alive()
+                    self._publish_status()
+                finally:
+                    self._lock.release()
+            else:
+                # A cycle waits for a plan, which may take seconds on a busy machine: the engine is alive all the same.
                 self._publish_status()
             time.sleep(_WATCH_PERIOD_S)
         return 0
@@ -99,7 +106,7 @@ class ControlEngineNode:
             self._joints = dict(zip(state.name, state.position))
             self._stamp = state.header.stamp
             goals = self._engine.tick(state.header.stamp.to_sec(), self._joints)
-            # After the tick, not before: planning a motion may take longer than the timeout.
+            # After the tick, not before: one that waits for a plan may take longer than the timeout.
             self._heard_s = time.monotonic()
             command = JointState(name=list(goals), position=list(goals.values()))
             command.velocity = command.effort = [0.0] * len(goals)
@@ -130,7 +137,7 @@ class ControlEngineNode:
                 # rospy hands a uint8[] over as bytes.
                 balls = dict(zip((tube.name for tube in request.tubes), bytes(request.balls)))
                 pour = request.pour or self._settings.default_pour
-                self._engine.start(actions, tubes, balls, pour, request.pause_after_pours)
+                self._engine.start(actions, tubes, balls, pour, request.pause_after_pours, request.hands_at_once)
             except ControlError as error:
                 return srv.ExecuteStrategyResponse(messages.engine_code_number(error.code), error.message, self._strategy_id)
             self._strategy_id += 1
@@ -186,7 +193,9 @@ def _serve() -> int:
         calibrations = {hand: load_calibration(folder, hand) for hand in HANDS}
         found = [hand for hand in HANDS if calibration_file(folder, hand).exists()]
         rospy.loginfo("arm calibrations in %s: %s", folder, ", ".join(found) or "none, the arms are taken to be as drawn")
-    engine = ControlEngine(ControlSettings.from_mapping(parameters, where), load_pieces(), ArmNetwork.load(), calibrations)
+    engine = ControlEngine(
+        ControlSettings.from_mapping(parameters, where), load_pieces(), ArmNetwork.load(), calibrations, node_settings.wait_for_plans
+    )
     return ControlEngineNode(engine, node_settings).serve()
 
 

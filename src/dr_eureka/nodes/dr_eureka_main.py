@@ -18,6 +18,7 @@ from dr_eureka.behaviour.observation import Frame, Observation
 from dr_eureka.behaviour.report import GameCode
 from dr_eureka.control.codes import POUR_METHODS
 from dr_eureka.game.planner import STRATEGIES, Planner
+from dr_eureka.game.planner_settings import load_planner_settings
 from dr_eureka.nodes.announcer import Announcer
 from dr_eureka.nodes.bag_check import check_bag
 from dr_eureka.nodes.engine_client import EngineClient
@@ -77,7 +78,7 @@ class DrEurekaMain:
         * **~goal** (str): state to reach instead of a card, such as RR|GG|PP, or `card`: read one
         * **~games** (int): games to play, each from what the tubes are seen to hold
         * **~confirm_card** (bool): wait after each card, before any motion of the arms, until a person confirms or corrects it
-        * **~strategy** (str): fewest, fastest or surest; **~pour** (str): lock or direct
+        * **~strategy** (str): fewest, fastest or surest; **~pour** (str): lock, linear or profiled
         * **~image_transport** (str): raw or compressed
         * **~camera_calibration** (str): file that calibrate_camera wrote, used instead of camera/camera_info; or `none`
         * **~replay** (bool): command nothing, look at recorded images; **~bag** (str): the recording, checked first
@@ -168,7 +169,7 @@ def _serve() -> int:
         return read_contents(frame.image, frame.camera, frame.base_from_camera, {}, pieces, contents_settings, held=held)
 
     announcer = Announcer(strategy)
-    engine = None if replay else EngineClient(settings.service_limit)
+    engine = None if replay else EngineClient(settings.service_limit, load_planner_settings().hands_at_once)
     flow = GameFlow(
         flow_settings,
         goal=goal,

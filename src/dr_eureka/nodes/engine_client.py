@@ -16,10 +16,14 @@ from dr_eureka.nodes import messages
 
 
 class EngineClient:
-    """Commands `control_engine` by service (`behaviour.observation.Robot`) and listens to its status."""
+    """Commands `control_engine` by service (`behaviour.observation.Robot`) and listens to its status.
 
-    def __init__(self, limit_s: float):
+    With `hands_at_once`, strategies are asked for with both hands picking and placing at the same time.
+    """
+
+    def __init__(self, limit_s: float, hands_at_once: bool = False):
         self._limit_s = limit_s
+        self._hands_at_once = hands_at_once
         self._view: Optional[EngineView] = None
         self._set_joints = rospy.ServiceProxy("control_engine/set_joints", srv.SetJoints)
         self._execute_strategy = rospy.ServiceProxy("control_engine/execute_strategy", srv.ExecuteStrategy)
@@ -51,6 +55,7 @@ class EngineClient:
             balls=bytes(balls[name] for name in tubes),
             pour=pour,
             pause_after_pours=True,
+            hands_at_once=self._hands_at_once,
         )
         return self._ask(self._execute_strategy, request)
 

@@ -55,6 +55,7 @@ def engine_status_to_message(status: EngineStatus, strategy_id: int, time: rospy
         action_index=status.action_index,
         message=status.message,
         paused=status.paused,
+        at_once=status.at_once,
     )
     message.header.stamp = time
     return message
@@ -71,6 +72,7 @@ def engine_view(status: msg.EngineStatus, heard_wall_s: float) -> EngineView:
         message=status.message,
         heard_wall_s=heard_wall_s,
         held={tube.name: pose_from_message(tube.pose) for tube in status.held},
+        at_once=max(1, status.at_once),
     )
 
 

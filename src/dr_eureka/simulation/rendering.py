@@ -175,15 +175,19 @@ class HeadCamera:
             file.unlink()
         return body
 
-    def image(self) -> np.ndarray:
-        """Return the present view as (height, width, 3) uint8 RGB, with the sensor's gain and noise."""
+    def image(self, base_from_camera: np.ndarray | None = None) -> np.ndarray:
+        """Return the present view as (height, width, 3) uint8 RGB, with the sensor's gain and noise.
+
+        base_from_camera (4, 4): where a camera of the same kind looks along its z, instead of the robot's own.
+        """
         self._place_hand_markers()
+        view = self._view(self._robot.link_pose("cam_link") if base_from_camera is None else base_from_camera)
         if self._renderer == EGL:
-            scene = self._render()
+            scene = self._render(view)
         else:
-            walls = self._render()
+            walls = self._render(view)
             self._set_walls(0.0)
-            without = self._render()
+            without = self._render(view)
             self._set_walls(self._settings.wall_tint)
             scene = cv2.addWeighted(walls, self._settings.wall_tint, without, 1.0 - self._settings.wall_tint, 0.0)
         if self._distortion_maps is not None:
@@ -194,21 +198,22 @@ class HeadCamera:
         for tube in self._tubes:
             self._client.changeVisualShape(tube, -1, shapeIndex=WALL_SHAPE, rgbaColor=(*WALL_COLOUR, alpha))
 
-    def _render(self) -> np.ndarray:
+    def _render(self, view: list[float]) -> np.ndarray:
         settings = self._settings
         lamp = (self._placement.light_direction * LAMP_DISTANCE).tolist()
         opengl = self._renderer == EGL
         pixels = self._client.getCameraImage(
-            settings.width, settings.height, self._view(), self._projection, lightDirection=lamp, lightColor=(1, 1, 1),
+            settings.width, settings.height, view, self._projection, lightDirection=lamp, lightColor=(1, 1, 1),
             # TinyRenderer's shadow map ends amid the table.
             shadow=int(opengl), flags=pybullet.ER_NO_SEGMENTATION_MASK,
             renderer=pybullet.ER_BULLET_HARDWARE_OPENGL if opengl else pybullet.ER_TINY_RENDERER)[2]
         rgba = np.asarray(pixels, dtype=np.uint8).reshape(settings.height, settings.width, 4)
         return np.ascontiguousarray(rgba[:, :, :3])
 
-    def _view(self) -> list[float]:
+    @staticmethod
+    def _view(base_from_camera: np.ndarray) -> list[float]:
         """Return OpenGL's view matrix, column by column: its camera looks along -z with y up."""
-        base_from_camera = self._robot.link_pose("cam_link") @ np.diag([1.0, -1.0, -1.0, 1.0])
+        base_from_camera = base_from_camera @ np.diag([1.0, -1.0, -1.0, 1.0])
         rotation, position = base_from_camera[:3, :3], base_from_camera[:3, 3]
         view = np.eye(4)
         view[:3, :3], view[:3, 3] = rotation.T, -rotation.T @ position

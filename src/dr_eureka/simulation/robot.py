@@ -151,6 +151,14 @@ class SimulatedRobot:
             self.body, self._indices, pybullet.POSITION_CONTROL, targetPositions=targets.tolist(), forces=self._forces,
             positionGains=self._gains, velocityGains=self._velocity_gains)
 
+    def servo_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return goals, set-points and the set-points of the cycle before (n,) [rad], for `set_servo_state`."""
+        return self._goals.copy(), self._setpoints.copy(), self._previous.copy()
+
+    def set_servo_state(self, state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+        """Let the servos go on from a state as `servo_state` returned it."""
+        self._goals, self._setpoints, self._previous = (values.copy() for values in state)
+
     def _angles(self) -> np.ndarray:
         return np.array([state[0] for state in self._client.getJointStates(self.body, self._indices)]) - self._offsets
 

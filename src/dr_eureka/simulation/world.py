@@ -177,6 +177,10 @@ class World:
         """Render the head camera's view as (height, width, 3) uint8 RGB; raises SimulationError without a camera."""
         return self._need_camera().image()
 
+    def picture_from(self, base_from_camera: np.ndarray) -> np.ndarray:
+        """Render what a camera like the head's sees from elsewhere, (4, 4) looking along z, for people who watch."""
+        return self._need_camera().image(base_from_camera)
+
     def show_card(self, picture: np.ndarray | None) -> None:
         """Hold up a card with this (n, n, 3) uint8 RGB picture, white border included, or take it away (None)."""
         self._need_camera().show_card(picture)

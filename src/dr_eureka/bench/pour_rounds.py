@@ -1,0 +1,115 @@
+"""Rounds of pours: in each, the tubes are grasped once and every kind of pour is tried from there.
+
+Each round has its own random numbers, drawn from seed and number, so that the outcome does not depend on how many processes share
+the work. The rounds of one kind of pour are independent of one another.
+"""
+from __future__ import annotations
+
+import multiprocessing
+import os
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from dr_eureka.bench.pour_rig import PourKind, PourRig
+from dr_eureka.bench.pour_spread import Spread, mistimed
+from dr_eureka.bench.report import progress
+from dr_eureka.control.codes import ControlError
+from dr_eureka.control.settings import ControlSettings
+from dr_eureka.game.hands import HANDS
+from dr_eureka.game.state import BALLS_PER_COLOUR, COLOURS, TUBE_CAPACITY
+from dr_eureka.pieces import Pieces, load_pieces
+from dr_eureka.resources import load_yaml
+from dr_eureka.simulation.settings import WorldSettings, load_world_settings
+from dr_eureka.simulation.stage import Stage
+
+CONTROL = "config/control_engine.yaml"
+BALLS = BALLS_PER_COLOUR * len(COLOURS)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A pour that was tried: how far off [rad] the tube that was poured from sat in the hand, and what became of it.
+
+    Without `arrived` it was refused, or the grasp before it: `code` is the engine's.
+    """
+
+    kind: PourKind
+    tilt: float
+    code: str
+    arrived: int | None = None
+    lost: int = 0
+    seconds: float = 0.0
+
+    @property
+    def right(self) -> bool:
+        """Whether just as many balls arrived as were meant to, and none was lost."""
+        return self.arrived == self.kind.count and self.lost == 0
+
+
+def lock_kinds() -> list[PourKind]:
+    """Return the lock-pours out of 1 to 4 balls into 0 to 3 that six balls allow, by either hand."""
+    return [
+        PourKind("lock", hand, held, 1, there)
+        for hand in HANDS for held in range(1, TUBE_CAPACITY + 1) for there in range(min(TUBE_CAPACITY, BALLS + 1 - held))
+    ]
+
+
+def direct_kinds(method: str, hand: str) -> list[PourKind]:
+    """Return the pours of Table 2, then those of all balls, into an empty tube."""
+    every = [PourKind(method, hand, held, count, 0) for held in range(TUBE_CAPACITY, 0, -1) for count in range(1, held + 1)]
+    return sorted(every, key=lambda kind: kind.held == kind.count)
+
+
+def run_rounds(spread: Spread, seed: int, rounds: int, processes: int | None, label: str) -> list[Trial]:
+    """Return the trials of so many rounds, in order; `processes`: how many work, by default one a core."""
+    count = processes or len(os.sched_getaffinity(0))
+    if count == 1:
+        _prepare()
+        done = progress(map(partial(_round, spread, seed), range(rounds)), rounds, label)
+        return [trial for trials in done for trial in trials]
+    # A fork would share the physics engine's state; a new interpreter starts clean.
+    with multiprocessing.get_context("spawn").Pool(count, _prepare) as pool:
+        return [trial for trials in progress(pool.imap(partial(_round, spread, seed), range(rounds)), rounds, label) for trial in trials]
+
+
+@dataclass(frozen=True, eq=False)
+class _Bench:
+    control: ControlSettings
+    world: WorldSettings
+    pieces: Pieces
+    stage: Stage
+
+
+_bench: _Bench | None = None
+
+
+def _prepare() -> None:
+    """Load this process's settings, once."""
+    global _bench
+    if _bench is None:
+        control = ControlSettings.from_mapping(load_yaml(CONTROL), CONTROL)
+        _bench = _Bench(control, load_world_settings(), load_pieces(), Stage(None))
+
+
+def _round(spread: Spread, seed: int, number: int) -> list[Trial]:
+    # Direct pours change hands from round to round, lock-pours are tried with both in each.
+    hand = HANDS[number % len(HANDS)]
+    kinds = [*direct_kinds("profiled", hand), *direct_kinds("linear", hand), *lock_kinds()]
+    rng = np.random.default_rng((seed, number, 5))
+    bench = _bench
+    try:
+        rig = PourRig(bench.control, bench.world, bench.pieces, spread, seed * 1_000_003 + number, bench.stage)
+    except ControlError as error:
+        return [Trial(kind, 0.0, error.code) for kind in kinds]
+    trials = []
+    for kind in kinds:
+        settings = mistimed(bench.control, spread, rng)
+        try:
+            poured = rig.pour(kind, settings)
+        except ControlError as error:
+            trials.append(Trial(kind, rig.tilts[kind.hand], error.code))
+        else:
+            trials.append(Trial(kind, rig.tilts[kind.hand], "OK", poured.arrived, poured.lost, poured.seconds))
+    return trials
