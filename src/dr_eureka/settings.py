@@ -38,7 +38,8 @@ def build(cls: type[T], mapping: Mapping[str, Any], where: str = "settings") -> 
     """Build the frozen dataclass `cls` from a mapping, refusing whatever does not fit.
 
     Fields may be bool, int, float, str, nested dataclasses, `tuple[X, ...]`, `tuple[X, Y]`, `dict[K, V]` and
-    `Optional[X]`. A whole number is taken for a float field; nothing else is converted. The field metadata `min` and
+    `Optional[X]`. A whole number is taken for a float field, and digits for the key of a
+    `dict[int, V]`; nothing else is converted. The field metadata `min` and
     `max` (both allowed values) and `choices` hold for each number or word inside a tuple or dict as well.
     Raises SettingsError naming `where`, the key, the value and what was expected.
     """
@@ -93,10 +94,12 @@ def _dict(hint: Any, value: Any, where: str, key: str, limits: Mapping[str, Any]
     key_hint, value_hint = typing.get_args(hint)
     if not isinstance(value, Mapping):
         raise SettingsError(where, key, f"is {value!r}", _describe(hint, {}), value)
-    return {
-        _leaf(key_hint, name, where, f"key of {key}", {}): _value(value_hint, item, where, _join(key, name), limits)
-        for name, item in value.items()
-    }
+    built = {}
+    for name, item in value.items():
+        # ROS parameters have words alone for names: there a whole number is written as one.
+        number = int(name) if key_hint is int and isinstance(name, str) and name.isdecimal() else name
+        built[_leaf(key_hint, number, where, f"key of {key}", {})] = _value(value_hint, item, where, _join(key, name), limits)
+    return built
 
 
 def _leaf(hint: Any, value: Any, where: str, key: str, limits: Mapping[str, Any]) -> Any:

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Optional
 
@@ -37,14 +37,20 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             print(f"linear, {held} balls: it turns back at step, by balls to pour:", by_count)
         if arguments.write:
             file = resource_path(_CONTROL)
-            figures = {("linear_pour", "return_steps", held): by_count for held, by_count in steps.items()}
-            text = rewrite(file.read_text(encoding="utf-8"), {("profiled_pour", "dip_seconds"): seconds, **figures})
+            figures = {("linear_pour", "return_steps", str(held)): _as_words(turns) for held, turns in steps.items()}
+            figures["profiled_pour", "dip_seconds"] = _as_words(seconds)
+            text = rewrite(file.read_text(encoding="utf-8"), figures)
             file.write_text(text, encoding="utf-8")
             print(f"written into {_CONTROL}")
     except (DrEurekaError, OSError) as error:
         print(f"calibrate_pours: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def _as_words(figures: Mapping[int, float]) -> dict[str, float]:
+    """Return figures by number with the numbers as words, as ROS wants the names of parameters."""
+    return {str(number): figure for number, figure in figures.items()}
 
 
 def _parser() -> argparse.ArgumentParser:
