@@ -15,8 +15,8 @@ START, GOAL = "RR|GG|PP", "R|G|PPRG"
 AFTER_FIRST_POUR = "R|GG|PPR"
 GAME_LIMIT_S = 240.0
 SERVICE_LIMIT_S = 60.0
-# The wrist turns the tube that is poured from back by 23 degrees, about its lip: it never tips, and no ball leaves it.
-JOG = SpoilPourRequest(fault=SpoilPourRequest.JOG, joints=["l_arm_wr_r"], offsets=[-0.4], seconds=3.0)
+# The wrist lifts the mouth of the tube that is poured from by 5 cm and turns it back by 14 degrees: no ball leaves it.
+JOG = SpoilPourRequest(fault=SpoilPourRequest.JOG, joints=["l_arm_wr_y"], offsets=[-0.3], seconds=3.0)
 KNOCK_OUT = SpoilPourRequest(fault=SpoilPourRequest.KNOCK_OUT_BALL)
 
 
