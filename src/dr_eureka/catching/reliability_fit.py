@@ -43,6 +43,8 @@ class ReliabilitySums:
     """
 
     def __init__(self, terms: int, values: int, reliability: float):
+        if not 0.0 < reliability <= 1.0:
+            raise ValueError(f"reliability is {reliability}; expected 0 < r <= 1")
         self._reliability = reliability
         self._matrix = np.zeros((terms, terms))
         # With the squared weights, for the covariance.
@@ -84,8 +86,6 @@ class ReliabilityFit:
 
     def __init__(self, reliability: float):
         """Start without points; `reliability` is r of Equation 9, 0 < r <= 1."""
-        if not 0.0 < reliability <= 1.0:
-            raise ValueError(f"reliability is {reliability}; expected 0 < r <= 1")
         self._over_depth = ReliabilitySums(3, 2, reliability)
         self._over_time = ReliabilitySums(2, 1, reliability)
         self._stamps = StampCheck()

@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 import torch
 
+from dr_eureka.checkpoint import load_checkpoint, save_checkpoint
 from dr_eureka.game.state import COLOURS
 from dr_eureka.vision.card_architecture import CardDetector, build_network, to_arrays
-from dr_eureka.vision.card_checkpoint import load_checkpoint, save_checkpoint
 from dr_eureka.vision.card_detections import collect
 from dr_eureka.vision.card_metrics import mean_average_precision
 from dr_eureka.vision.card_network import decode
@@ -101,9 +101,10 @@ def train(plan: TrainingPlan, folder: Path) -> CardDetector:
     network = build_network(plan.model).to(memory_format=torch.channels_last)
     averaged = copy.deepcopy(network)
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-4)
+    modules = {"network": network, "averaged": averaged}
     first_epoch = 0
     if checkpoint.exists():
-        first_epoch = load_checkpoint(checkpoint, network, averaged, optimiser)
+        first_epoch = load_checkpoint(checkpoint, modules, optimiser)
     else:
         log.write_text("epoch,samples,loss,map50,exact,seconds\n")
     steps = plan.samples_per_epoch // plan.batch
@@ -119,7 +120,7 @@ def train(plan: TrainingPlan, folder: Path) -> CardDetector:
             _show_progress(epoch, step + 1, steps, float(np.mean(losses[-50:])))
         map50, exact = validate(averaged, samples)
         save_detector(plan.model, to_arrays(averaged), folder)
-        save_checkpoint(checkpoint, network, averaged, optimiser, epoch + 1)
+        save_checkpoint(checkpoint, modules, optimiser, epoch + 1)
         line = (f"{epoch + 1},{(epoch + 1) * steps * plan.batch},{np.mean(losses):.4f},{map50:.4f},{exact:.4f},"
                 f"{time.monotonic() - started:.0f}\n")
         with log.open("a") as file:
