@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Both arms pick a tube each at the same time; how fast they went is measured in the joint states that the robot publishes."""
+"""Both arms pick a tube each at the same time; how fast they went is measured in the joint states that the robot sends."""
 
 import sys
 import threading
@@ -65,7 +65,8 @@ class BothHandsTest(unittest.TestCase):
         picks = [Action(kind=Action.PICK, hand=hand, tube=hand) for hand in HANDS]
         answer = self.execute(picks, tubes, bytes([2] * len(tubes)), "lock", False, True)
         self.assertEqual(answer.result, EngineStatus.OK, answer.message)
-        self.until(lambda: self.status and self.status.strategy_id == answer.strategy_id and self.status.at_once == 2, "two at once")
+        mine = lambda: self.status and self.status.strategy_id == answer.strategy_id
+        self.until(lambda: mine() and self.status.at_once == 2, "two at once")
         self.until(lambda: self.status.state != EngineStatus.BUSY, "over")
         self.assertEqual((self.status.state, self.status.code), (EngineStatus.DONE, EngineStatus.OK), self.status.message)
         with self.heard:

@@ -47,6 +47,7 @@ class SpoiltPoursTest(unittest.TestCase):
         )
         # Seen in the hands after the first pour of two, so the second was not made then.
         self.assertEqual(result["pours"], 3)
+        self.assertRegex(self.output, "tube in a hand seen to hold .*, expected .*: putting the tubes down to look again")
         self.assertIn(f"tubes: they hold {START}, expected {AFTER_FIRST_POUR}: planning anew", self.output)
 
     def test_a_ball_that_was_knocked_out_ends_the_game_with_its_own_code(self):

@@ -5,7 +5,9 @@ from scipy.optimize import minimize
 
 from dr_eureka.kinematics.arms import arm_chain, mirror, mirror_delta, mirror_transform
 from dr_eureka.kinematics.network import ArmNetwork, ArmNetworkError
-from dr_eureka.kinematics.samples import SampleSettings, draw_paper_samples, draw_samples, least_norm_change, moved, pose_errors
+from dr_eureka.kinematics.samples import (
+    SampleSettings, draw_paper_samples, draw_samples, least_norm_change, moved, pose_errors,
+)
 from dr_eureka.kinematics.step_errors import step_errors, step_methods
 from dr_eureka.resources import load_weights
 
@@ -42,8 +44,8 @@ def test_numpy_inference_agrees_with_torch(network, samples):
         layer, part = key.split(".")
         if key.endswith("num_batches_tracked"):
             continue
-        dense = int(layer) % 3 == 0
-        state[key] = torch.tensor(weights[f"dense{int(layer) // 3}_{part}" if dense else f"norm{int(layer) // 3}_{names[part]}"])
+        index, dense = int(layer) // 3, int(layer) % 3 == 0
+        state[key] = torch.tensor(weights[f"dense{index}_{part}" if dense else f"norm{index}_{names[part]}"])
     model.load_state_dict(state)
     model.eval()
     inputs = np.concatenate([samples.delta, network.normalise(samples.joints)], axis=1)
@@ -112,11 +114,15 @@ def test_targets_are_the_smallest_joint_steps_by_an_independent_optimiser(sample
     chain = arm_chain("left")
     for index in range(8):
         start, target = samples.joints[index], samples.target[index]
+
+        def missed(change):
+            return pose_errors(chain.forward((start + change)[None]), target[None])[0]
+
         answer = minimize(
             lambda change: change @ change,
             np.zeros(7),
             jac=lambda change: 2.0 * change,
-            constraints={"type": "eq", "fun": lambda change: pose_errors(chain.forward((start + change)[None]), target[None])[0]},
+            constraints={"type": "eq", "fun": missed},
             options={"ftol": 1e-12, "maxiter": 200},
         )
         assert answer.success

@@ -1,5 +1,6 @@
 """Training of the arm network: its loss, its stream of samples, and runs that are broken off."""
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,8 +50,8 @@ def test_training_lowers_the_loss_and_logs_every_round(trained):
 def test_a_run_broken_off_ends_with_the_weights_of_one_that_was_not(trained, tmp_path, monkeypatch):
     save = training.save_checkpoint
 
-    def save_and_break_off(path, modules, optimiser, done):
-        save(path, modules, optimiser, done)
+    def save_and_break_off(path, modules, optimiser, done, plan):
+        save(path, modules, optimiser, done, plan)
         if done == 3:
             raise KeyboardInterrupt
 
@@ -68,9 +69,9 @@ def test_the_batch_norm_keeps_its_statistics_in_the_later_rounds(tmp_path, monke
     means = []
     save = training.save_checkpoint
 
-    def watch(path, modules, optimiser, done):
+    def watch(path, modules, optimiser, done, plan):
         means.append(modules["model"][1].running_mean.clone())
-        save(path, modules, optimiser, done)
+        save(path, modules, optimiser, done, plan)
 
     monkeypatch.setattr(training, "save_checkpoint", watch)
     train(PLAN, tmp_path)
@@ -84,6 +85,13 @@ def test_a_checkpoint_that_is_none_is_named(tmp_path):
         train(PLAN, tmp_path)
 
 
+def test_a_run_does_not_go_on_by_another_plan(trained):
+    with pytest.raises(CheckpointError, match="begun with batch 64, seed 1, now asked for batch 32, seed 2; go on as begun"):
+        train(replace(PLAN, batch=32, seed=2), trained)
+    with pytest.raises(CheckpointError, match="begun with straight_share 0.3, now asked for straight_share 0.0"):
+        train(PLAN, trained, SampleSettings(straight_share=0.0))
+
+
 def test_a_perfect_step_costs_nothing_and_each_error_its_weight():
     chain = arm_chain("left")
     rows = torch.from_numpy(as_rows(draw_samples(chain, 50, np.random.default_rng(1))))
@@ -92,7 +100,8 @@ def test_a_perfect_step_costs_nothing_and_each_error_its_weight():
     assert float(hand_loss(kinematics, plan, joints, wanted[:, :7], wanted)) == pytest.approx(0.0, abs=1e-4)
     moved = wanted.clone()
     moved[:, 16] += 0.01  # the target one centimetre farther in x
-    assert float(hand_loss(kinematics, plan, joints, wanted[:, :7], moved)) == pytest.approx(plan.position_weight * 1e-4, rel=0.05)
+    loss = float(hand_loss(kinematics, plan, joints, wanted[:, :7], moved))
+    assert loss == pytest.approx(plan.position_weight * 1e-4, rel=0.05)
 
 
 def test_the_torch_chain_agrees_with_the_numpy_chain():

@@ -1,5 +1,7 @@
 """The benchmark `kinematics`: its rows against figures worked out by hand, its poses, and each solver for real."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -25,9 +27,8 @@ def by_name(rows):
 def trials(solved, cycles=5.0, commanded=0.5):
     """Return four trials, so many of them solved; the others miss by a centimetre."""
     shift = np.where(np.arange(4) < solved, 1e-4, 0.01)
-    return Trials(
-        np.array([0.001, 0.002, 0.003, 0.004]), shift, np.zeros(4), np.ones(4), np.full(4, cycles), np.full(4, commanded), np.full(4, 1.0)
-    )
+    seconds, figures = np.array([0.001, 0.002, 0.003, 0.004]), (np.full(4, figure) for figure in (cycles, commanded, 1.0))
+    return Trials(seconds, shift, np.zeros(4), np.ones(4), *figures)
 
 
 def test_every_row_on_the_chain_meets_its_goal(monkeypatch):
@@ -143,7 +144,8 @@ def test_the_network_alone_comes_near_and_stays_inside_the_limits():
 
 
 def test_steps_are_measured_and_judged_by_size_and_test(tmp_path):
-    table = {(test, size, method): np.full(3, 0.004) for test in TESTS for size in STEP_SIZES for method in ("network", "pseudo_inverse", "damped")}
+    methods = ("network", "pseudo_inverse", "damped")
+    table = {key: np.full(3, 0.004) for key in product(TESTS, STEP_SIZES, methods)}
     table["joint_change", 0.30, "network"] = np.full(3, 0.006)
     table["straight", 0.05, "pseudo_inverse"] = np.full(3, 0.005)
     rows = by_name(step_rows(table))

@@ -1,8 +1,11 @@
 """YOLO-Dr. Eureka: the paper's size and shape, decoding, folding, learning, resuming, scoring."""
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
+from dr_eureka.checkpoint import CheckpointError
 from dr_eureka.cli.train_card_detector import main
 from dr_eureka.vision.card_architecture import (
     GRID, RAW_CHANNELS, build_network, parameter_count, to_arrays,
@@ -143,6 +146,8 @@ def test_a_run_that_is_broken_off_and_resumed_ends_with_the_same_weights(tmp_pat
         assert np.allclose(array, resumed[name], atol=1e-5), name
     log = (tmp_path / "parts" / "card_detector.csv").read_text().splitlines()
     assert [line.split(",")[0] for line in log] == ["epoch", "1", "2"]
+    with pytest.raises(CheckpointError, match="begun with epochs 2, model eureka, now asked for epochs 3, model tiny"):
+        train(replace(plan, epochs=3, model="tiny"), tmp_path / "parts")
 
 
 @pytest.mark.parametrize("words, expected", [

@@ -12,16 +12,41 @@ from dr_eureka.simulation.settings import SimulationError
 from dr_eureka.simulation.throws import BEYOND, REACH, build_throws, draw_throw, load_throws
 
 KINDS = load_throws()
-WATCHING = RobotWord(CatchPhase.WATCHING)
-FOLLOWING = RobotWord(CatchPhase.FOLLOWING)
+
+
+def word(time_s, phase, balls=0, result="", moves=0):
+    return RobotWord(time_s, phase, balls, result, "", moves)
+
+
+def watching(time_s, balls=0, result=""):
+    return word(time_s, CatchPhase.WATCHING, balls, result)
+
+
+def following(time_s):
+    return word(time_s, CatchPhase.FOLLOWING)
+
+
+def said(time_s, result, balls, moves=3):
+    return word(time_s, CatchPhase.GETTING_READY, balls, result, moves)
+
+
+def go_on(play, now_s, verdict, *words):
+    """Have the session hear the words, and go on."""
+    for each in words:
+        play.hear(each)
+    return play.step(now_s, verdict)
+
+
+def flying(throws=1, aim=REACH):
+    """Return a session whose first ball was let go at 0.4 s."""
+    play = session(throws, aim)
+    assert go_on(play, 0.0, NO_BALL, watching(0.0)) is None
+    assert go_on(play, 0.4, NO_BALL) is not None
+    return play
 
 
 def session(throws=2, aim=REACH):
     return CatchSession(throws, aim, KINDS["thrown"], SessionSettings(5.0, 0.3, 8.0), np.random.default_rng(1))
-
-
-def said(result, balls, moves=3):
-    return RobotWord(CatchPhase.GETTING_READY, balls, result, "", moves)
 
 
 @pytest.mark.parametrize("aim", [REACH, BEYOND])
@@ -55,71 +80,76 @@ def test_kinds_of_balls_that_are_none_are_refused(mapping):
 
 def test_a_ball_goes_when_the_robot_has_watched_for_a_while():
     play = session()
-    assert play.step(0.0, None, NO_BALL) is None
-    assert play.step(1.0, WATCHING, NO_BALL) is None
-    assert play.step(1.2, FOLLOWING, NO_BALL) is None
-    assert play.step(1.25, WATCHING, NO_BALL) is None
-    assert play.step(1.5, WATCHING, NO_BALL) is None
-    assert play.step(1.56, WATCHING, NO_BALL) is not None and play.released == 1
+    assert go_on(play, 0.0, NO_BALL) is None
+    assert go_on(play, 1.0, NO_BALL, watching(1.0)) is None
+    assert go_on(play, 1.2, NO_BALL, following(1.2)) is None
+    assert go_on(play, 1.25, NO_BALL, watching(1.25)) is None
+    assert go_on(play, 1.5, NO_BALL, watching(1.5)) is None
+    assert go_on(play, 1.56, NO_BALL) is not None and play.released == 1
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.008, 0.1, 0.25])
+def test_when_a_ball_goes_does_not_depend_on_how_fast_words_travel(delay_s):
+    words = [following(0.0), watching(1.0), following(1.4), said(2.0, CatchResult.CAUGHT, 1), watching(2.5, 1)]
+    play, released_s = session(), []
+    for cycle in range(500):
+        now_s = 0.008 * cycle
+        while words and words[0].time_s + delay_s <= now_s:
+            play.hear(words.pop(0))
+        if play.step(now_s, FLYING if play.released and now_s < 1.8 else CAUGHT) is not None:
+            released_s.append(round(now_s, 3))
+    assert released_s == [1.304, 2.8]
 
 
 def test_a_robot_that_is_still_being_started_has_all_the_time():
     play = session()
-    assert play.step(0.0, None, NO_BALL) is None and play.step(1000.0, None, NO_BALL) is None
+    assert go_on(play, 0.0, NO_BALL) is None and go_on(play, 1000.0, NO_BALL) is None
     assert play.results == []
 
 
 def test_a_session_ends_when_robot_and_referee_have_spoken_of_every_ball():
-    play = session()
-    play.step(0.0, WATCHING, NO_BALL)
-    assert play.step(0.4, WATCHING, NO_BALL) is not None
-    play.step(0.9, FOLLOWING, FLYING)
-    play.step(1.4, FOLLOWING, CAUGHT)
+    play = flying(throws=2)
+    go_on(play, 0.9, FLYING, following(0.9))
+    go_on(play, 1.4, CAUGHT, following(1.4))
     assert play.results == []
-    play.step(2.4, said(CatchResult.CAUGHT, 1), CAUGHT)
+    go_on(play, 2.4, CAUGHT, said(2.4, CatchResult.CAUGHT, 1))
     assert [result["verdict"] for result in play.results] == [CAUGHT] and not play.over
     # The next ball goes only when the robot watches again, and its old word does not count for it.
-    play.step(3.0, RobotWord(CatchPhase.WATCHING, 1, CatchResult.CAUGHT), CAUGHT)
-    assert play.step(3.4, RobotWord(CatchPhase.WATCHING, 1, CatchResult.CAUGHT), CAUGHT) is not None
-    play.step(3.5, RobotWord(CatchPhase.WATCHING, 1, CatchResult.CAUGHT), MISSED)
+    go_on(play, 3.0, CAUGHT, watching(3.0, 1, CatchResult.CAUGHT))
+    assert go_on(play, 3.4, CAUGHT, watching(3.4, 1, CatchResult.CAUGHT)) is not None
+    go_on(play, 3.5, MISSED, watching(3.5, 1, CatchResult.CAUGHT))
     assert not play.over
-    play.step(5.0, said(CatchResult.MISSED, 2), MISSED)
+    go_on(play, 5.0, MISSED, said(5.0, CatchResult.MISSED, 2))
     assert play.over and not play.ok
     mapping = play.as_mapping()
     assert (mapping["caught"], [ball["ok"] for ball in mapping["balls"]]) == (1, [True, False])
     assert describe_ball(mapping["balls"][0]).startswith("CAUGHT: robot says CAUGHT")
 
 
-@pytest.mark.parametrize("truth, word, ok", [
+@pytest.mark.parametrize("truth, result, ok", [
     (CAUGHT, CatchResult.CAUGHT, True), (CAUGHT, CatchResult.MISSED, False), (MISSED, CatchResult.CAUGHT, False),
     (MISSED, CatchResult.OUT_OF_REACH, False),
 ])
-def test_a_ball_in_reach_must_be_caught_and_the_robot_must_know(truth, word, ok):
-    play = session(throws=1)
-    play.step(0.0, WATCHING, NO_BALL)
-    play.step(0.4, WATCHING, NO_BALL)
-    play.step(2.0, said(word, 1), truth)
+def test_a_ball_in_reach_must_be_caught_and_the_robot_must_know(truth, result, ok):
+    play = flying()
+    go_on(play, 2.0, truth, said(2.0, result, 1))
     assert play.ok == ok
 
 
-@pytest.mark.parametrize("word, moves, ok", [
+@pytest.mark.parametrize("result, moves, ok", [
     (CatchResult.OUT_OF_REACH, 0, True), (CatchResult.OUT_OF_REACH, 2, False), (CatchResult.MISSED, 0, False),
 ])
-def test_a_ball_beyond_reach_must_be_called_so_without_a_move(word, moves, ok):
-    play = session(throws=1, aim=BEYOND)
-    play.step(0.0, WATCHING, NO_BALL)
-    play.step(0.4, WATCHING, NO_BALL)
-    play.step(2.0, said(word, 1, moves), MISSED)
+def test_a_ball_beyond_reach_must_be_called_so_without_a_move(result, moves, ok):
+    play = flying(aim=BEYOND)
+    go_on(play, 2.0, MISSED, said(2.0, result, 1, moves))
     assert play.ok == ok
 
 
 def test_a_robot_that_says_nothing_or_never_gets_ready_does_not_hold_the_session_up():
-    play = session()
-    play.step(0.0, WATCHING, NO_BALL)
-    play.step(0.4, WATCHING, NO_BALL)
-    play.step(8.5, FOLLOWING, FLYING)
+    play = flying(throws=2)
+    go_on(play, 8.5, FLYING, following(8.5))
     assert (play.results[0]["verdict"], play.results[0]["robot"]) == (MISSED, None)
-    play.step(9.0, FOLLOWING, MISSED)
-    play.step(14.1, FOLLOWING, MISSED)
+    go_on(play, 9.0, MISSED, following(9.0))
+    go_on(play, 14.1, MISSED, following(14.1))
     assert play.over and not play.ok and play.results[1]["verdict"] == NOT_THROWN and play.released == 1
     assert "robot says nothing" in describe_ball(play.results[1])

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from catch_stand_in import ARM, CYCLE_S, SETTINGS, StandIn, thrown_to
+from catch_stand_in import ARM, CYCLE_S, NETWORK, SETTINGS, StandIn, thrown_to
 
+from dr_eureka.catching.arm_network import OutOfReachError
 from dr_eureka.catching.ball_track import TWO_BALLS, View
 from dr_eureka.catching.catch_report import CatchPhase, CatchReason, CatchResult
 from dr_eureka.catching.catcher_settings import CONFIG, CatcherSettings, checked
@@ -104,6 +105,24 @@ def test_a_ball_out_of_reach_is_called_so_and_the_arm_stays(place):
     assert moved(stand_in) < 1e-9
 
 
+@pytest.mark.parametrize("in_basket, result", [(True, CatchResult.CAUGHT), (False, CatchResult.OUT_OF_REACH)])
+def test_a_ball_that_turns_out_to_be_beyond_reach_is_looked_for_in_the_basket_that_was_sent(in_basket, result):
+    stand_in, places = StandIn(), []
+
+    class OnceInReach:
+        """The network, for which every place but the first is out of reach."""
+
+        def joints(self, position):
+            places.append(position)
+            if len(places) > 2:
+                raise OutOfReachError("beyond")
+            return NETWORK.joints(position)
+
+    stand_in.catcher._inverse = OnceInReach()
+    report = stand_in.run(lambda t: [thrown_to(PLACE).at(t)], in_basket)
+    assert (report.result, report.moves) == (result, 1)
+
+
 def test_joints_keep_their_speed_limits_and_a_ball_is_carried_slowly():
     stand_in = StandIn()
     stand_in.run(lambda t: [thrown_to(PLACE).at(t)], in_basket=True)
@@ -160,10 +179,19 @@ def test_views_without_a_time_or_from_the_past_are_refused_by_name():
         return replace(view, time_s=stamp)
 
     stand_in = StandIn(alter=stamped_wrongly)
-    stand_in.run(lambda t: [thrown_to(PLACE).at(t)])
+    report = stand_in.run(lambda t: [thrown_to(PLACE).at(t)])
     refusals = stand_in.catcher.refusals
     assert refusals[PredictionReason.NOT_FINITE] > 5 and refusals[PredictionReason.STAMP_NOT_RISING] > 5
-    assert np.isfinite(stand_in.goals).all()
+    # The third of the views that is left tells the path.
+    np.testing.assert_allclose(report.prediction.position, PLACE, atol=2e-3)
+    assert np.abs(np.diff(stand_in.goals, axis=0)).max() <= ARM.speed.max() * CYCLE_S + 1e-9
+
+
+def test_views_none_of_which_has_a_time_move_nothing_and_are_counted_by_name():
+    stand_in = StandIn(alter=lambda view: replace(view, time_s=float("nan")))
+    assert stand_in.run(lambda t: [thrown_to(PLACE).at(t)], limit_s=1.0) is None
+    assert (stand_in.catcher.phase, set(stand_in.catcher.refusals)) == (CatchPhase.WATCHING, {PredictionReason.NOT_FINITE})
+    assert moved(stand_in) < 1e-9
 
 
 def test_a_seen_ball_without_size_or_place_is_refused_by_name():

@@ -13,10 +13,26 @@ from dr_eureka.kinematics.transforms import matrix_to_quaternion, rotation_vecto
 # ROBOTIS manager (two of its stored postures and zero).
 MANAGER_VECTORS = [
     ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.43, 0.462, 1.0145], [0.0, 0.0, 0.0, 1.0]),
-    ([0.436332313, 1.308996939, 0.0872664626, -0.5235987756, 0.0, 0.0, 0.0], [0.124317572, 0.297002645, 0.468184775], [-0.525940469, 0.353503711, 0.300446656, 0.712848901]),
-    ([1.1684979342, 1.0520844731, -0.1869247629, 0.6010913944, 1.0403907671, -0.1478293876, 0.5578072289], [0.149980013, 0.310010458, 0.780445969], [-0.00010687, 4.9186e-05, 7.8923e-05, 0.99999999]),
-    ([0.5689773362, 1.0316641209, -0.1153662636, 0.4944517771, 1.0410888988, -0.1574286985, 0.0851720675], [0.299977516, 0.309993686, 0.799481262], [-0.000146443, 0.000110445, 6.386e-05, 0.999999981]),
-    ([0.3, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0], [0.338749083, 0.650097692, 0.907889317], [0.036971586, 0.144792463, 0.244625879, 0.95803258]),
+    (
+        [0.436332313, 1.308996939, 0.0872664626, -0.5235987756, 0.0, 0.0, 0.0],
+        [0.124317572, 0.297002645, 0.468184775],
+        [-0.525940469, 0.353503711, 0.300446656, 0.712848901],
+    ),
+    (
+        [1.1684979342, 1.0520844731, -0.1869247629, 0.6010913944, 1.0403907671, -0.1478293876, 0.5578072289],
+        [0.149980013, 0.310010458, 0.780445969],
+        [-0.00010687, 4.9186e-05, 7.8923e-05, 0.99999999],
+    ),
+    (
+        [0.5689773362, 1.0316641209, -0.1153662636, 0.4944517771, 1.0410888988, -0.1574286985, 0.0851720675],
+        [0.299977516, 0.309993686, 0.799481262],
+        [-0.000146443, 0.000110445, 6.386e-05, 0.999999981],
+    ),
+    (
+        [0.3, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0],
+        [0.338749083, 0.650097692, 0.907889317],
+        [0.036971586, 0.144792463, 0.244625879, 0.95803258],
+    ),
 ]
 
 SMALL_ROBOT = """
@@ -25,7 +41,8 @@ SMALL_ROBOT = """
   <joint name="foot" type="fixed"><parent link="floor"/><child link="post"/><origin xyz="0 0 1" rpy="0 0 1.2"/></joint>
   <joint name="first" type="revolute"><parent link="post"/><child link="upper"/>
     <origin xyz="0.1 0 0.2" rpy="0.3 -0.4 0.5"/><axis xyz="1 2 -2"/><limit lower="-1" upper="2" velocity="3"/></joint>
-  <joint name="second" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0 0.5 0"/><axis xyz="0 0 -1"/></joint>
+  <joint name="second" type="continuous"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0 0.5 0"/><axis xyz="0 0 -1"/></joint>
   <joint name="flange" type="fixed"><parent link="lower"/><child link="tool"/><origin xyz="0 0.4 0.1" rpy="0 1 0"/></joint>
   <joint name="rail" type="prismatic"><parent link="post"/><child link="slide"/><limit lower="0" upper="1"/></joint>
 </robot>
@@ -84,7 +101,8 @@ def test_the_jacobian_agrees_with_finite_differences(side):
         jacobian = chain.jacobian(joints)
         for index in range(7):
             after, before = (chain.forward(joints + sign * step * np.eye(7)[index]) for sign in (1, -1))
-            numeric = np.concatenate([after[:3, 3] - before[:3, 3], rotation_vector(after[:3, :3] @ before[:3, :3].T)]) / (2 * step)
+            turn = rotation_vector(after[:3, :3] @ before[:3, :3].T)
+            numeric = np.concatenate([after[:3, 3] - before[:3, 3], turn]) / (2 * step)
             np.testing.assert_allclose(jacobian[:, index], numeric, atol=1e-8)
 
 

@@ -102,7 +102,7 @@ def posture(arms, left: list[float]) -> dict[str, float]:
 
 
 def random_swing(arms, seed):
-    """Return the joints before and a motion of both arms from home to somewhere in front of the robot, on all sorts of ways."""
+    """Return the joints before and a motion of both arms from home to somewhere before the robot, on all sorts of ways."""
     rng = np.random.default_rng(seed)
     start = posture(arms, SETTINGS.postures.home)
     end = dict(start)
@@ -158,6 +158,28 @@ def test_an_elbow_that_folds_in_hits_the_robot_itself(checker, arms):
     start = posture(arms, [0.6, -0.4, 0.9, 0.0, 0.0, 0.0, 0.0])
     hit = checker.first_hit(start, TIMES, {"r_arm_el_y": np.linspace(0.0, -1.2, len(TIMES))}, NO_TUBES)
     assert "pelvis_link" in hit.bodies and any(body.startswith("r_arm") for body in hit.bodies)
+
+
+@pytest.mark.parametrize("side", HANDS)
+def test_a_hand_that_folds_back_is_stopped_before_its_own_shoulder(side, checker, arms, boxes):
+    shoulder, forearm = ([f"{side[0]}_arm_{name}_link" for name in names] for names in (("sh_p1", "sh_r"), LINKS[1:]))
+    rng, shares, hits = np.random.default_rng(6), np.linspace(0.0, 1.0, len(TIMES))[:, None], 0
+    for _ in range(6):
+        stretched = np.array([-1.2, 0.7, 0.0, 0.0, 0.0, 0.0, 0.0]) + rng.uniform(-0.15, 0.15, 7)
+        folded = np.append(stretched[:3], rng.uniform([0.9, -0.3, 1.2, 0.5], [1.2, 0.3, 1.4, 0.8]))
+        ends = [arms[side].posture(angles) for angles in (stretched, folded)]
+        start = posture(arms, SETTINGS.postures.home) | dict(zip(arms[side].joints, ends[0]))
+        moving = dict(zip(arms[side].joints, (ends[0] * (1 - shares) + ends[1] * shares).T))
+        hit = checker.first_hit(start, TIMES, moving, NO_TUBES)
+        until = len(TIMES) - 1 if hit is None else int(np.argmin(np.abs(TIMES - hit.elapsed)))
+        for index in np.linspace(0.5 * until, until, 3).astype(int):
+            joints = start | {name: values[index] for name, values in moving.items()}
+            assert least_distance(boxes, joints, shoulder, forearm) > 1e-3
+        if hit is not None:
+            hits += 1
+            assert set(hit.bodies) & set(shoulder) and set(hit.bodies) & set(forearm)
+            assert -1e-4 < hit.distance - least_distance(boxes, joints, *([body] for body in hit.bodies)) < 1.5e-3
+    assert hits >= 3
 
 
 @pytest.mark.parametrize("allowed", [False, True])

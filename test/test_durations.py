@@ -84,7 +84,8 @@ def test_actions_of_both_hands_at_once_each_last_as_long_as_both():
     ]
     again = [dict(action, start=action["start"] + 15.0, end=action["end"] + 15.0) for action in actions]
     found = found_in([{"solved": True, "pour": "lock", "actions": actions + again}])
-    assert found["pick", "from_home", "left", "left"] == found["pick", "from_home", "right", "right"] == {"seconds": 5.0, "trials": 1}
+    assert found["pick", "from_home", "left", "left"] == {"seconds": 5.0, "trials": 1, "failed": 0}
+    assert found["pick", "from_home", "right", "right"] == found["pick", "from_home", "left", "left"]
     assert found["pick", "after_place", "right", "right"]["seconds"] == 5.0
     # Both places begin with bringing the tubes upright; the second two end at home, the first two do not.
     assert found["home",] == {"seconds": 0.0, "trials": 2}
@@ -107,6 +108,18 @@ def test_a_hand_that_has_been_home_since_starts_from_home_again():
 def test_the_action_that_ended_a_failed_game_does_not_count():
     failed = {**GAMES[1], "solved": False, "actions": GAMES[1]["actions"][:2] + [{**GAMES[1]["actions"][2], "end": 900.0}]}
     assert all(figure["seconds"] < 10.0 for figure in measure([failed]).values())
+
+
+def test_a_pick_that_a_fault_ended_is_counted_and_does_not_lengthen_the_others():
+    actions = [dict(action) for action in GAMES[0]["actions"]]
+    tried = [actions[0], {**actions[1], "end": 60.0, "failed": True}]
+    later = [{**action, "start": action["start"] + 100.0, "end": action["end"] + 100.0} for action in actions]
+    found, smooth = found_in([{**GAMES[0], "actions": tried + later}]), found_in(GAMES[:1])
+    first, second = (("pick", "from_home", action["hand"], action["tube"]) for action in actions[:2])
+    assert (actions[0]["kind"], actions[1]["kind"]) == ("pick", "pick")
+    assert found[first] == {"seconds": PICK["from_home"], "trials": smooth[first]["trials"] + 1, "failed": 0}
+    assert found[second] == {"seconds": PICK["from_home"], "trials": smooth[second]["trials"], "failed": 1}
+    assert found.keys() == smooth.keys()
 
 
 def test_the_yaml_gets_new_figures_and_keeps_all_else():

@@ -163,6 +163,48 @@ def test_after_a_tube_slipped_out_of_a_hand_the_other_is_put_back(moment):
     assert not engine.body.held and "right" in engine.body.places
 
 
+@pytest.mark.parametrize("lost", ["left", "right"])
+def test_nothing_is_poured_once_a_tube_has_slipped_out_of_a_hand(lost):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start(actions_for([Pour("left", "right", 1)] * 2), PLACES, BALLS, pause_after_pours=True)
+    while not engine.status.paused:
+        robot.cycle()
+    began = len(robot.history)
+    robot.empty = {lost}
+    engine.go_on(put_down=False)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.TUBE_SLIPPED and "before the pour" in engine.status.message
+    axis_up = [engine.body.arms["left"].pose(row)[2, 2] for row in robot.history[began:]]
+    assert min(axis_up) > 0.9 * axis_up[0] > 0.1
+
+
+@pytest.mark.parametrize("moment", [2, 3])
+def test_tubes_that_slipped_out_of_both_hands_are_a_fault_with_that_name(moment):
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS)
+    while engine.status.action_index < moment:
+        robot.cycle()
+    robot.empty = {"left", "right"}
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.TUBE_SLIPPED, engine.status
+    assert not engine.body.held and engine.body.pour_ready is None
+
+
+@pytest.mark.parametrize("finger_stop", [0.8, 1.06])
+def test_fingers_that_stop_where_no_tube_stops_them_lift_nothing(finger_stop):
+    engine = make_engine()
+    robot = IdealRobot(engine, finger_stop)
+    engine.start([Action("pick", "left", "left")], PLACES, BALLS)
+    assert robot.run() == EngineState.FAULT
+    assert engine.status.code == EngineCode.GRASP_EMPTY
+    assert f"fingers at {finger_stop:.3f} rad, expected 0.900 to 1.030" in engine.status.message
+    heights = [engine.body.arms["left"].pose(row)[2, 3] for row in robot.history if row["l_arm_grip"] == engine.settings.grip.closed]
+    assert heights == pytest.approx([PLACES["left"][2] + engine.settings.pick.grip_height] * len(heights), abs=1e-3)
+    assert heights and not engine.body.held and engine.body.places["left"] == pytest.approx(PLACES["left"])
+
+
 @pytest.mark.parametrize("foot", [(0.9, 0.1, 0.775), (0.44, -0.5, 0.775)])
 def test_a_tube_out_of_reach_is_named(foot):
     engine = make_engine()
@@ -307,6 +349,23 @@ def test_a_request_to_move_nothing_is_refused():
 
 
 @pytest.mark.parametrize(
+    "balls, words",
+    [
+        ({"left": 1, "right": 0}, r"action 2 .*: the tube will hold 1 balls by then, the other one have room for 4"),
+        ({"left": 3, "right": 3}, r"action 2 .*: the tube will hold 3 balls by then, the other one have room for 1"),
+        ({"left": 3, "right": 1}, r"action 3 .*: the tube will hold 1 balls by then, the other one have room for 1"),
+        ({}, r"action 2 .*: the tube will hold 0 balls by then, the other one have room for 4"),
+    ],
+)
+def test_a_pour_of_more_balls_than_there_are_or_have_room_is_refused_before_anything_moves(balls, words):
+    engine = make_engine()
+    IdealRobot(engine)
+    with pytest.raises(ControlError, match=words) as caught:
+        engine.start(actions_for([Pour("left", "right", 2)] * 2), PLACES, balls)
+    assert caught.value.code == EngineCode.INVALID_ACTION and engine.status.state == EngineState.IDLE
+
+
+@pytest.mark.parametrize(
     "action, word",
     [(Action("throw", "left", "left"), "throw"), (Action("pick", "middle", "left"), "middle"), (Action("place", "left", "foo"), "foo")],
 )
@@ -359,6 +418,22 @@ def test_a_hand_stopped_with_a_tube_must_be_opened_before_the_next_strategy():
     robot.run()
     engine.start([Action("pick", "right", "right")], PLACES, BALLS)
     assert robot.run() == EngineState.DONE, engine.status
+
+
+def test_a_pour_that_was_stopped_leaves_no_way_back_to_a_later_strategy():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.start(actions_for([Pour("left", "right", 1)]), PLACES, BALLS)
+    while engine.body.pour_ready is None:
+        robot.cycle()
+    engine.stop()
+    for _ in range(10):
+        robot.cycle()
+    assert engine.body.upright
+    engine.move_joints({"l_arm_grip": 0.5, "r_arm_grip": 0.5}, 1.0)
+    robot.run()
+    engine.start([], PLACES, BALLS)
+    assert engine.body.pour_ready is None and not engine.body.upright
 
 
 def test_no_strategy_starts_with_the_torso_turned():

@@ -67,7 +67,7 @@ class World:
         self.cards = list(cards)
         self.results = list(results)
         self.reports, self.plans, self.found_cards, self.found_tubes = [], [], [], []
-        self.confirmations, self.surprises, self.answers, self.faults = [], [], [], []
+        self.confirmations, self.surprises, self.answers, self.faults, self.hands = [], [], [], [], []
         self.gazes, self.strategies, self.stops = [], [], 0
         self.answer = EngineCode.OK
         self.now = Observation(
@@ -151,6 +151,9 @@ class World:
 
     def on_surprise(self, expected, seen):
         self.surprises.append((str(expected), str(seen)))
+
+    def on_hands(self, message):
+        self.hands.append(message)
 
     def on_fault(self, message):
         self.faults.append(message)
@@ -316,7 +319,7 @@ def test_tubes_in_the_hands_are_looked_at_after_a_pour_and_what_is_right_goes_on
     assert world.flow.looking and world.answers == []
     for _ in range(5):
         world.step()
-    assert world.answers == [False] and not world.flow.looking
+    assert world.answers == [False] and not world.flow.looking and world.hands == []
     assert world.flow.report().pours == tuple(pours)
     pour = world.flow.report().actions[-1]
     assert pour.action.kind == "pour" and pour.end_s < world.flow.report().robot_seconds - 0.3
@@ -333,6 +336,10 @@ def test_a_pour_that_is_seen_in_the_hands_to_have_gone_wrong_ends_the_part():
     for _ in range(5):
         world.step()
     assert world.answers == [True]
+    after = START.after(pours[0])
+    assert world.hands == [", ".join(
+        f"{tube} tube in a hand seen to hold {START.tube(tube)}, expected {after.tube(tube)}" for tube in tubes
+    ) + ": putting the tubes down to look again"]
     assert world.flow.report().pours == tuple(pours[:1])
     world.results = [str(START)]
     finish(world)
@@ -369,6 +376,7 @@ def test_hands_of_which_no_image_comes_are_taken_for_right_at_the_limit():
     for _ in range(5):
         world.step()
     assert world.answers == [False]
+    assert world.hands == ["no image of the tubes in the hands within 1 s: going on"]
 
 
 def pours_tubes(start, goal):
@@ -700,7 +708,19 @@ def test_a_grasp_that_failed_is_tried_again_from_what_is_seen_but_not_without_en
     world.engine(EngineState.FAULT, code, strategy_id=attempt + 1, action_index=1, message="left hand closed on nothing")
     report = world.step()
     assert (report.phase, report.code, report.replans) == (Phase.FAILED, GameCode.ENGINE_FAULT, SETTINGS.most_replans)
+    assert report.pours == ()
     assert report.message == f"control_engine: {code}: action 1: left hand closed on nothing, after 2 replans"
+
+
+def test_pours_that_a_fault_kept_from_beginning_are_not_counted():
+    world, pours = world_in_pause(**dict.fromkeys(TUBES, ""))
+    assert world.flow.report().pours == tuple(pours) and len(pours) > 1
+    index = world.now.engine.action_index
+    world.engine(EngineState.FAULT, EngineCode.TUBE_SLIPPED, strategy_id=1, action_index=index, message="left hand after the pour")
+    world.step()
+    report = world.flow.report()
+    assert (report.phase, report.pours) == (Phase.CHECKING, tuple(pours[:1]))
+    assert [record.failed for record in report.actions] == [False] * index + [True]
 
 
 def test_a_stop_by_hand_ends_the_game():

@@ -28,7 +28,8 @@ def tube_poses(side, count, seed):
     sign = 1.0 if side == "left" else -1.0
     poses = []
     for _ in range(count):
-        grasp = [0.44 + rng.uniform(-0.02, 0.02), sign * rng.choice([0.0, 0.11]) + rng.uniform(-0.02, 0.02), rng.uniform(0.81, 1.0)]
+        x, y = 0.44 + rng.uniform(-0.02, 0.02), sign * rng.choice([0.0, 0.11]) + rng.uniform(-0.02, 0.02)
+        grasp = [x, y, rng.uniform(0.81, 1.0)]
         yawed = transform(rotation_about([0, 0, 1], sign * np.radians(-30)), grasp)
         poses.append(yawed @ transform(translation=[-0.019, 0.0, 0.0]))
     return poses
@@ -94,7 +95,9 @@ def test_the_network_saves_cycles_in_the_papers_settings(network):
 
 
 @pytest.mark.parametrize(
-    "step", [[1.1, 0, 0, 0, 0, 0, 0], [0, 0.6, 0, 0, 0, 0, 0], [0.3, 0, 0.3, 0, 0, 0, 0], [np.nan] * 7], ids=["jump", "limit", "away", "nan"]
+    "step",
+    [[1.1, 0, 0, 0, 0, 0, 0], [0, 0.6, 0, 0, 0, 0, 0], [0.3, 0, 0.3, 0, 0, 0, 0], [np.nan] * 7],
+    ids=["jump", "limit", "away", "nan"],
 )
 def test_a_network_step_that_cannot_be_trusted_is_refused_and_the_jacobian_takes_over(step):
     target = tube_poses("left", 1, seed=5)[0]
@@ -137,15 +140,26 @@ def test_spare_freedom_goes_to_the_rest_posture_wherever_the_arm_starts(network)
         np.testing.assert_allclose(result.joints, PICK, atol=0.05)
 
 
-def not_a_rotation():
+def pose_with(place, value):
     pose = np.eye(4)
-    pose[0, 0] = -1.0
+    pose[place] = value
     return pose
 
 
-@pytest.mark.parametrize(
-    "target", [np.full((4, 4), np.nan), np.diag([1, 1, 1, np.inf]), np.eye(3), not_a_rotation(), 2 * np.eye(4), "left", [[1, 2], [3]]]
-)
+NO_POSES = {
+    "nan": np.full((4, 4), np.nan),
+    "infinite": np.diag([1, 1, 1, np.inf]),
+    "small": np.eye(3),
+    "mirror": pose_with((0, 0), -1.0),
+    "scaled": np.diag([2.0, 2.0, 2.0, 1.0]),
+    "huge": np.diag([1e200, 1e200, 1e200, 1.0]),
+    "last row": pose_with((3, 1), 0.5),
+    "word": "left",
+    "ragged": [[1, 2], [3]],
+}
+
+
+@pytest.mark.parametrize("target", NO_POSES.values(), ids=NO_POSES)
 def test_a_target_that_is_no_pose_is_named_invalid(target, network):
     result = HybridSolver(arm_chain("left"), network).solve(HOME, target)
     assert result.code == IkCode.INVALID_TARGET and result.cycles == 0 and result.reason
@@ -193,6 +207,13 @@ def test_too_few_cycles_end_with_the_last_error(network):
     assert result.position_error_m == pytest.approx(errors(arm_chain("left"), result.joints, target)[0], abs=1e-12)
 
 
+def test_when_time_runs_out_the_answer_is_what_was_reached_by_then(network):
+    chain, target = arm_chain("left"), tube_poses("left", 1, seed=10)[0]
+    result = HybridSolver(chain, network, HybridSettings(max_seconds=1e-9, restarts=1000)).solve(HOME, target)
+    assert result.code == IkCode.NO_CONVERGENCE and result.cycles <= 2 and result.restarts == 0
+    assert result.position_error_m == pytest.approx(errors(chain, result.joints, target)[0], abs=1e-12)
+
+
 def test_random_targets_always_end_with_a_code_and_never_break_a_limit(network):
     rng = np.random.default_rng(11)
     for side in SIDES:
@@ -204,7 +225,8 @@ def test_random_targets_always_end_with_a_code_and_never_break_a_limit(network):
             result = solver.solve(start, transform(turn, chain.first_joint_origin + rng.normal(size=3) * 0.35))
             assert result.code in (IkCode.CONVERGED, IkCode.NO_CONVERGENCE, IkCode.OUT_OF_LIMITS, IkCode.UNREACHABLE)
             assert all(chain.within_limits(joints, 1e-12) for joints in result.path)
-            assert (result.code == IkCode.CONVERGED) == (result.position_error_m <= 2e-4 and result.orientation_error_rad <= 2e-3)
+            reached = result.position_error_m <= 2e-4 and result.orientation_error_rad <= 2e-3
+            assert (result.code == IkCode.CONVERGED) == reached
 
 
 def test_the_shipped_yaml_is_complete_and_holds_the_defaults():

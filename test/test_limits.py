@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from test_engine import IdealRobot, make_engine
 
 from dr_eureka.control.codes import ControlError, EngineCode
-from dr_eureka.control.limits import CommandLimiter, JointLimit
+from dr_eureka.control.limits import CommandLimiter, JointLimit, joint_ranges
+from dr_eureka.control.port import CONTROLLED_JOINTS
 
 
 def limiter() -> CommandLimiter:
@@ -52,3 +54,21 @@ def test_a_clock_that_goes_back_allows_no_movement():
     made = limiter()
     here = made.apply(1.0, {"a": 0.5})["a"]
     assert made.apply(0.5, {"a": -0.5})["a"] == here
+
+
+def test_every_controlled_joint_has_the_range_of_the_robots_description():
+    ranges = joint_ranges()
+    assert set(ranges) == set(CONTROLLED_JOINTS)
+    assert ranges["head_p"] == pytest.approx(np.radians([-60.0, 87.0])) and ranges["l_arm_grip"] == (0.0, 1.15)
+    assert ranges["l_arm_el_y"] == pytest.approx(np.radians([-45.0, 72.0]), abs=1e-4)
+    assert ranges["r_arm_el_y"] == pytest.approx(np.radians([-72.0, 45.0]), abs=1e-4)
+
+
+def test_a_limit_that_is_given_with_four_decimals_is_taken_for_the_limit():
+    engine = make_engine()
+    robot = IdealRobot(engine)
+    engine.move_joints({"head_y": 1.5708}, 0.0)
+    robot.run()
+    assert robot.joints["head_y"] == engine.ranges["head_y"][1] < 1.5708
+    with pytest.raises(ControlError, match="head_y to 1.572 rad, expected -1.571 to 1.571"):
+        engine.move_joints({"head_y": 1.572}, 0.0)

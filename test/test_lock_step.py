@@ -46,6 +46,13 @@ def test_an_answer_of_this_cycle_is_waited_for_once_the_controller_has_answered(
     assert 0.05 < took_s(lock_step) < 5.0
 
 
+def test_the_very_first_answer_is_waited_for_when_the_controller_is_known_to_be_there():
+    lock_step = expecting(7, limit_s=10.0)
+    lock_step.rely_on_answers()
+    threading.Timer(0.1, lock_step.on_command, [answer(7)]).start()
+    assert 0.05 < took_s(lock_step) < 5.0
+
+
 def test_a_controller_a_few_cycles_late_is_waited_for_from_then_on():
     lock_step = expecting(7)
     lock_step.on_command(answer(4))

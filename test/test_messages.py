@@ -104,7 +104,7 @@ def test_every_result_of_a_reading_has_a_constant(result):
 
 
 def test_a_game_report_survives_the_way_there_and_back():
-    records = tuple(ActionRecord(action, 1.25 + index, 2.25 + index) for index, action in enumerate(ACTIONS))
+    records = tuple(ActionRecord(action, 1.25 + index, 2.25 + index, index == 1) for index, action in enumerate(ACTIONS))
     pours = (Pour("center", "right", 2),)
     report = GameReport(Phase.PLAYING, GameCode.UNDECIDED, 1, 3, "RR|GG|PP", "RR|G|PPG", "RR||PPGG", "fastest", "linear", pours, records, 0, 4.5, 9.75, "on it")
     assert messages.report_from_message(messages.report_to_message(report, now_s=100.0)) == report

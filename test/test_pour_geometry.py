@@ -16,15 +16,12 @@ DIRECT = LipPlace("direct", gap=0.006, inset=-0.0015)
 
 def lowest_inner_lip(base_from_tube: np.ndarray) -> np.ndarray:
     """Find by search the lowest point of the bore's rim, for a tube lying roughly level."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 72001)
-    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles), np.zeros_like(angles)], axis=1) * PIECES.tube_bore / 2.0
-    rim[:, 2], rim[:, 3] = PIECES.tube_height, 1.0
-    points = (base_from_tube @ rim.T).T[:, :3]
+    points = rim_points(base_from_tube, 72001)
     return points[np.argmin(points[:, 2])]
 
 
-def rim_points(base_from_tube: np.ndarray) -> np.ndarray:
-    angles = np.linspace(0.0, 2.0 * np.pi, 7201)
+def rim_points(base_from_tube: np.ndarray, count: int = 7201) -> np.ndarray:
+    angles = np.linspace(0.0, 2.0 * np.pi, count)
     rim = np.stack([np.cos(angles), np.sin(angles)], axis=1) * PIECES.tube_bore / 2.0
     local = np.column_stack([rim, np.full(len(rim), PIECES.tube_height), np.ones(len(rim))])
     return (base_from_tube @ local.T).T[:, :3]
@@ -58,6 +55,17 @@ def test_withdrawing_moves_the_lip_by_that_distance_without_turning():
     near, far = geometry.source(0.2, 0.0), geometry.source(0.2, 0.014)
     assert np.linalg.norm(near[:3, 3] - far[:3, 3]) == pytest.approx(0.014)
     assert np.allclose(near[:3, :3], far[:3, :3])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.15, -0.1])
+def test_turning_both_tubes_keeps_the_targets_mouth_and_how_the_tubes_are_to_one_another(turn):
+    geometry = PourGeometry(PLACE, LOCK, PIECES)
+    source, target = geometry.source(-0.1, 0.01, turn), geometry.target(turn)
+    assert (target @ [0.0, 0.0, PIECES.tube_height, 1.0])[:3] == pytest.approx(PLACE.target_mouth)
+    alone = np.linalg.inv(geometry.target()) @ geometry.source(-0.1, 0.01)
+    assert np.linalg.inv(target) @ source == pytest.approx(alone, abs=1e-12)
+    assert np.arcsin(source[2, 2]) == pytest.approx(-0.1 + turn)
+    assert np.arcsin(target[2, 2]) == pytest.approx(PLACE.target_elevation - turn)
 
 
 def test_all_poses_are_rigid_transforms_and_so_are_their_mirror_images():

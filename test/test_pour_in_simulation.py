@@ -1,4 +1,6 @@
-"""Engine and simulated world in one process: tubes are gripped by friction, one ball goes over, all else stays."""
+"""Engine and simulated world in one process: tubes are gripped by friction, the balls meant go over, all else stays."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from dr_eureka.control.codes import EngineCode, EngineState
 from dr_eureka.control.engine import ControlEngine
 from dr_eureka.control.port import grip_joint
 from dr_eureka.control.settings import ControlSettings
-from dr_eureka.game.actions import actions_for
+from dr_eureka.game.actions import Action, actions_for
 from dr_eureka.game.state import TUBES, Pour, State
 from dr_eureka.pieces import load_pieces
 from dr_eureka.resources import load_yaml
@@ -24,9 +26,13 @@ def make_engine() -> ControlEngine:
 
 @pytest.mark.parametrize(
     "start, pour, method, at_once",
-    [("RRGG|P|P", Pour("left", "center", 1), "lock", True), ("RG|GPP|R", Pour("center", "right", 1), "profiled", False), ("RG|GPP|R", Pour("center", "right", 2), "linear", False)],
+    [
+        ("RRGG|P|P", Pour("left", "center", 1), "lock", True),
+        ("RG|GPP|R", Pour("center", "right", 1), "profiled", False),
+        ("RG|GPP|R", Pour("center", "right", 2), "linear", False),
+    ],
 )
-def test_exactly_one_ball_goes_from_one_tube_into_the_other(start, pour, method, at_once):
+def test_exactly_the_balls_meant_go_from_one_tube_into_the_other(start, pour, method, at_once):
     state, engine = State.parse(start), make_engine()
     world = World(load_world_settings(), seed=5, start=state)
     # Tubes as a camera would locate them: 2 mm off.
@@ -56,10 +62,19 @@ def test_a_hand_that_closes_beside_the_tube_says_so_and_lifts_nothing():
     engine = make_engine()
     world = World(load_world_settings(), seed=5)
     foot = world.tube_pose("left")[:3, 3]
-    status = play_actions(
-        world, engine, actions_for([Pour("left", "right", 1)]), {"left": foot + [-0.05, 0.06, 0.0], "right": foot}, {"left": 2}, "lock"
-    )
+    places = {"left": foot + [-0.05, 0.06, 0.0], "right": foot}
+    status = play_actions(world, engine, actions_for([Pour("left", "right", 1)]), places, {"left": 2}, "lock")
     standing = world.referee().tubes_standing
     world.close()
     assert status.code == EngineCode.GRASP_EMPTY
     assert standing["left"]
+
+
+def test_a_tube_that_slips_out_of_the_fingers_is_missed():
+    engine, settings = make_engine(), load_world_settings()
+    world = World(replace(settings, physics=replace(settings.physics, pad_friction=0.0)), seed=5)
+    places = {"left": world.tube_pose("left")[:3, 3]}
+    status = play_actions(world, engine, [Action("pick", "left", "left")], places, {"left": 2}, "lock")
+    world.close()
+    assert status.code == EngineCode.TUBE_SLIPPED and "lifted tube 'left'" in status.message
+    assert not engine.body.held

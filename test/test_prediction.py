@@ -6,12 +6,16 @@ from ball_flights import Flight, points_of, seen_by_eyes
 from scipy.optimize import curve_fit, least_squares
 
 from dr_eureka.catching.ballistic_fit import BallisticFit
+from dr_eureka.catching.falling_fit import FallingFit
 from dr_eureka.catching.prediction import GRAVITY_M_S2, BallPoint, CatchingPlane, PredictionReason, PredictionRefused
-from dr_eureka.catching.reliability_fit import ReliabilityFit, ReliabilitySums
+from dr_eureka.catching.reliability_fit import ReliabilityFit
+from dr_eureka.catching.reliability_sums import ReliabilitySums
 
 DEPTH, HEIGHT = CatchingPlane("depth", 0.4), CatchingPlane("height", -0.25)
 TIMES = np.arange(12) / 30.0
 PREDICTORS = {"paper": lambda: ReliabilityFit(0.9), "ballistic": lambda: BallisticFit(1e-4)}
+ALL = {**PREDICTORS, "paper, falling": lambda: FallingFit(0.9)}
+DROPPED = Flight((-0.2, 0.5, 0.6), (0, 0, 0))
 
 
 @pytest.fixture
@@ -123,16 +127,17 @@ def test_two_eyes_in_turn_measure_depth_better_than_the_same_views_by_size_alone
     assert np.mean(errors["both"]) < 0.5 * np.mean(errors["one"])
 
 
-@pytest.mark.parametrize("name", PREDICTORS)
+@pytest.mark.parametrize("name", ALL)
 def test_there_is_no_prediction_before_the_fifth_point(name):
-    predictor = PREDICTORS[name]()
+    predictor = ALL[name]()
     for count, point in enumerate(points_of(Flight(), TIMES[:5]), 1):
         predictor.add(point)
         if count < 5:
-            with pytest.raises(PredictionRefused) as refusal:
-                predictor.predict(DEPTH)
-            assert refusal.value.reason == PredictionReason.TOO_FEW_POINTS
-    assert predictor.predict(DEPTH).points == 5
+            for ask in (lambda: predictor.predict(HEIGHT), lambda: predictor.positions(TIMES)):
+                with pytest.raises(PredictionRefused) as refusal:
+                    ask()
+                assert refusal.value.reason == PredictionReason.TOO_FEW_POINTS
+    assert predictor.predict(HEIGHT).points == 5
 
 
 @pytest.mark.parametrize("name", PREDICTORS)
@@ -145,7 +150,7 @@ def test_the_prediction_is_renewed_with_every_point(name, rng):
     assert len(set(seen)) == len(TIMES) - 4
 
 
-@pytest.mark.parametrize("name", PREDICTORS)
+@pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("broken, reason", [
     (BallPoint(float("nan"), np.zeros(3), np.eye(3)), PredictionReason.NOT_FINITE),
     (BallPoint(1.0, np.array([0.0, np.nan, 0.0]), np.eye(3)), PredictionReason.NOT_FINITE),
@@ -155,12 +160,12 @@ def test_the_prediction_is_renewed_with_every_point(name, rng):
     (BallPoint(TIMES[3], np.zeros(3), np.eye(3)), PredictionReason.STAMP_NOT_RISING),
 ], ids=["stamp NaN", "place NaN", "covariance infinite", "two coordinates", "same stamp", "earlier stamp"])
 def test_a_point_that_is_none_is_refused_by_name_and_changes_nothing(name, broken, reason):
-    predictor = fed(PREDICTORS[name](), points_of(Flight(), TIMES))
-    before = predictor.predict(DEPTH)
+    predictor = fed(ALL[name](), points_of(Flight(), TIMES))
+    before = predictor.predict(HEIGHT)
     with pytest.raises(PredictionRefused) as refusal:
         predictor.add(broken)
     assert refusal.value.reason == reason
-    np.testing.assert_array_equal(predictor.predict(DEPTH).position, before.position)
+    np.testing.assert_array_equal(predictor.predict(HEIGHT).position, before.position)
 
 
 @pytest.mark.parametrize(
@@ -174,11 +179,42 @@ def test_the_paper_s_fit_refuses_a_depth_that_does_not_shrink(start, velocity, r
         assert refusal.value.reason == PredictionReason.DEPTH_CONSTANT
 
 
-def test_the_ballistic_fit_predicts_a_ball_that_falls_straight_down(rng):
-    flight = Flight((-0.2, 0.5, 0.6), (0, 0, 0))
-    prediction = fed(BallisticFit(1e-4), points_of(flight, TIMES, 0.004, rng)).predict(HEIGHT)
-    assert prediction.time_s == pytest.approx(flight.crossing_s(HEIGHT), abs=0.01)
+@pytest.mark.parametrize("fit", [BallisticFit(1e-4), FallingFit(0.9)], ids=["ballistic", "paper"])
+def test_both_fits_predict_a_ball_that_falls_straight_down(fit, rng):
+    prediction = fed(fit, points_of(DROPPED, TIMES, 0.004, rng)).predict(HEIGHT)
+    assert prediction.time_s == pytest.approx(DROPPED.crossing_s(HEIGHT), abs=0.01)
     np.testing.assert_allclose(prediction.position, [-0.2, 0.5, -0.25], atol=0.01)
+
+
+def test_the_paper_catches_a_falling_ball_under_the_weighted_mean_of_its_places(rng):
+    points = points_of(DROPPED, TIMES, 0.02, rng)
+    weights = 0.8 ** np.arange(len(points))[::-1]
+    elapsed, fallen = TIMES, np.array([point.position[2] for point in points]) + 0.5 * GRAVITY_M_S2 * TIMES**2
+    start, speed = np.polynomial.polynomial.polyfit(elapsed, fallen, 1, w=np.sqrt(weights))
+    prediction = fed(FallingFit(0.8), points).predict(HEIGHT)
+    mean = np.average([point.position[:2] for point in points], axis=0, weights=weights)
+    np.testing.assert_allclose(prediction.position, [*mean, -0.25], atol=1e-9)
+    when = max(np.roots([-0.5 * GRAVITY_M_S2, speed, start + 0.25]))
+    assert prediction.time_s == pytest.approx(when, abs=1e-9)
+    np.testing.assert_allclose(prediction.velocity, [0.0, 0.0, speed - GRAVITY_M_S2 * when], atol=1e-8)
+    fitted = fed(FallingFit(0.8), points).positions(np.array([0.1, when]))
+    np.testing.assert_allclose(fitted[0], [*mean, start + 0.1 * speed - 0.005 * GRAVITY_M_S2], atol=1e-9)
+    np.testing.assert_allclose(fitted[1], prediction.position, atol=1e-9)
+
+
+def test_the_spread_of_a_falling_ball_s_place_and_time_is_that_of_repeated_falls(rng):
+    found = [fed(FallingFit(0.9), points_of(DROPPED, TIMES, 0.01, rng)).predict(HEIGHT) for _ in range(300)]
+    stated = np.sqrt(np.diag(np.mean([prediction.covariance for prediction in found], axis=0)))
+    assert stated == pytest.approx(np.std([prediction.position for prediction in found], axis=0), rel=0.2)
+    times_s = [prediction.time_s for prediction in found]
+    assert np.mean([prediction.time_sigma_s for prediction in found]) == pytest.approx(np.std(times_s), rel=0.2)
+
+
+@pytest.mark.parametrize("plane", [DEPTH, CatchingPlane("height", 1.5)], ids=["depth", "above the ball"])
+def test_a_falling_ball_crosses_no_depth_and_no_height_above_it(plane):
+    with pytest.raises(PredictionRefused) as refusal:
+        fed(FallingFit(0.9), points_of(DROPPED, TIMES)).predict(plane)
+    assert refusal.value.reason == PredictionReason.NEVER_CROSSES
 
 
 @pytest.mark.parametrize("plane, flight", [

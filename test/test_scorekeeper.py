@@ -16,7 +16,7 @@ KEYS = {"seed", "start", "card", "goal", "strategy", "pour", "verdict", "solved"
 def report(game=0, games=1, start="RR|GG|PP", goal="R|GG|PPR", code=GameCode.SOLVED, card="R|GG|PPR"):
     actions = (
         ActionRecord(Action("pick", "left", "left"), 3.2, 9.0),
-        ActionRecord(Action("pour", "left", "left", "right", "right", 1), 9.0, 15.51234),
+        ActionRecord(Action("pour", "left", "left", "right", "right", 1), 9.0, 15.51234, failed=True),
     )
     phase = Phase.FINISHED if code == GameCode.SOLVED else Phase.FAILED
     return GameReport(
@@ -44,7 +44,7 @@ def test_one_game_has_its_keys_at_the_top_level():
         {"kind": "pick", "hand": "left", "tube": "left", "start": 3.2, "end": 9.0},
         {
             "kind": "pour", "hand": "left", "tube": "left", "target_hand": "right", "target_tube": "right", "count": 1,
-            "start": 9.0, "end": 15.512,
+            "start": 9.0, "end": 15.512, "failed": True,
         },
     ]
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from dr_eureka.control.trajectory import JointTrajectory, MinimumJerk, MotionLimits, Quickest, SampledTrajectory, TrajectorySequence
+from dr_eureka.control.trajectory import (
+    JointTrajectory, MinimumJerk, MotionLimits, Quickest, SampledTrajectory, TrajectorySequence,
+)
 
 LIMITS = MotionLimits(speed=1.5, acceleration=5.0, jerk=50.0)
 

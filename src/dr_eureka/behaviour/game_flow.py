@@ -233,14 +233,14 @@ class GameFlow:
         self._enter(Phase.PLAYING)
         self._playing = PartInPlay(
             part, seen.tubes, self._game.pour, self._robot, self._settings, self._now, self._game.since_began_s,
-            self._looks.read_held,
+            self._looks.read_held, self._listener.on_hands,
         )
 
     def _play(self) -> None:
         outcome = self._playing.step(self._now)
         begun = len(self._game.actions)
         earlier_pours, earlier_actions = self._earlier
-        self._game.pours = earlier_pours + self._playing.part.pours
+        self._game.pours = earlier_pours + self._playing.pours
         self._game.actions = earlier_actions + self._playing.records
         if len(self._game.actions) > begun:
             self._listener.on_report(self.report())

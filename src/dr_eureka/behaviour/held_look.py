@@ -20,8 +20,9 @@ ReadHeld = Callable[[Frame, Mapping[str, np.ndarray]], ContentsReading]
 class HeldLook:
     """Looks at what can be seen of the tubes in the hands, in images taken from `now` on.
 
-    Fingers hide the lower balls, the upper ones are seen: what is hidden is taken for right, and so is everything when no
-    images come within the limit, since all tubes are looked at again when they are put down.
+    Fingers hide the lower balls, the upper ones are seen: what is hidden is taken for right, and so is everything when the
+    images of the whole limit do not agree, since all tubes are looked at again when they are put down. `problem` tells in
+    one line what was seen otherwise than expected, or that nothing was; it is empty when all is right.
     """
 
     def __init__(self, read: ReadHeld, expected: State, settings: FlowSettings, now: Observation):
@@ -30,13 +31,20 @@ class HeldLook:
         self._settings = settings
         self._began = now
         self._newest: deque[bool] = deque(maxlen=settings.held_images)
+        self.problem = f"no image of the tubes in the hands within {settings.held_limit:g} s"
 
     def step(self, now: Observation) -> Optional[bool]:
         """Return whether the tubes hold what they should as far as is seen, None while it is not decided."""
         frame, held = now.frame, now.engine.held
         if frame is not None and frame.stamp_s >= self._began.robot_s:
             tubes = self._read(frame, held).tubes
-            self._newest.append(all(_fits(tubes[name].colours, self._expected.tube(name)) for name in held))
+            pairs = {name: (tubes[name].colours, self._expected.tube(name)) for name in held}
+            odd = {name: pair for name, pair in pairs.items() if not _fits(*pair)}
+            self._newest.append(not odd)
+            self.problem = ", ".join(
+                f"{name} tube in a hand seen to hold {seen or 'nothing'}, expected {expected or 'nothing'}"
+                for name, (seen, expected) in odd.items()
+            )
             if len(self._newest) == self._settings.held_images and len(set(self._newest)) == 1:
                 return self._newest[0]
         limit_s = self._settings.held_limit

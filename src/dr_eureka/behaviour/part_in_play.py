@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Callable, Mapping, Optional
 
 from dr_eureka.behaviour.failure import Failure, failure_in
@@ -19,10 +20,10 @@ class PartInPlay:
     """Turns the head to where the pours will be seen, then gives the engine its actions and follows them.
 
     After each pour but the last it looks at the tubes in the hands; if a pour went wrong, `part` ends there, and `left_out`
-    are the pours that were not made.
+    are the pours that were not made. `pours` are those of the part, after a fault only those that were begun.
 
-    `places` are `vision.tubes.TubePlace` by name, `method` is lock, linear or profiled, `game_s` tells the robot time since the game
-    began [s].
+    `places` are `vision.tubes.TubePlace` by name, `method` is lock, linear or profiled, `game_s` tells the robot time since
+    the game began [s], `tell` takes a line on tubes in the hands that were not seen to hold what they should.
     """
 
     def __init__(
@@ -35,10 +36,13 @@ class PartInPlay:
         now: Observation,
         game_s: Callable[[Observation], float],
         read_held: ReadHeld,
+        tell: Callable[[str], None],
     ):
         self.part = part
+        self.pours = part.pours
         self.left_out: tuple[Pour, ...] = ()
         self._read_held = read_held
+        self._tell = tell
         self._held_look: Optional[HeldLook] = None
         self._paused_at = self._answered = -1
         self._under_way = 1
@@ -73,6 +77,8 @@ class PartInPlay:
             return self._look_at_hands(now)
         if engine.state in (EngineState.BUSY, EngineState.DONE):
             return engine.state == EngineState.DONE
+        self.pours = self.part.after_action(engine.action_index).pours
+        self._records[-self._under_way :] = [replace(record, failed=True) for record in self._records[-self._under_way :]]
         doing = f"action {engine.action_index}: " if engine.action_index >= 0 else ""
         return Failure(GameCode.ENGINE_FAULT, f"control_engine: {engine.code}: {doing}{engine.message}")
 
@@ -90,9 +96,11 @@ class PartInPlay:
         right = self._held_look.step(now)
         if right is None:
             return False
+        if self._held_look.problem:
+            self._tell(f"{self._held_look.problem}: {'going on' if right else 'putting the tubes down to look again'}")
         self._held_look, self._answered = None, now.engine.action_index
         if not right:
-            self.part, self.left_out = done, self.part.pours[len(done.pours) :]
+            self.part, self.pours, self.left_out = done, done.pours, self.part.pours[len(done.pours) :]
         return failure_in(self._robot.go_on(put_down=not right)) or False
 
     def _begin(self, now: Observation) -> bool | Failure:
@@ -110,7 +118,7 @@ class PartInPlay:
         """
         if self._records and len(self._records) - 1 != self._paused_at:
             under_way = self._records[-self._under_way :]
-            self._records[-self._under_way :] = [ActionRecord(record.action, record.start_s, now_s) for record in under_way]
+            self._records[-self._under_way :] = [replace(record, end_s=now_s) for record in under_way]
         self._under_way = engine.at_once
         news = self._actions[len(self._records) : engine.action_index + 1]
         self._records += [ActionRecord(action, now_s, now_s) for action in news]

@@ -62,11 +62,15 @@ class GameCode:
 
 @dataclass(frozen=True)
 class ActionRecord:
-    """An action that was begun; `start_s` and `end_s` are robot time, `end_s` so far when it is under way."""
+    """An action that was begun; `start_s` and `end_s` are robot time, `end_s` so far when it is under way.
+
+    `failed`: it was under way when a fault of the engine ended the strategy; `end_s` is when the engine had told of it.
+    """
 
     action: Action
     start_s: float
     end_s: float
+    failed: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,6 +121,9 @@ class Listener(Protocol):
 
     def on_surprise(self, expected: State, seen: State) -> None:
         """The tubes hold something else than the pours should have led to; a new plan follows."""
+
+    def on_hands(self, message: str) -> None:
+        """The tubes in the hands were seen after a pour to hold something else than they should, or not seen at all."""
 
     def on_fault(self, message: str) -> None:
         """A grasp failed, and the robot has put down what it held; a look and a new plan follow."""

@@ -85,4 +85,5 @@ class Scorecard:
 def _action(record: ActionRecord) -> dict[str, Any]:
     """Return an action without the fields that do not apply; `start` and `end` are robot seconds since the game began."""
     fields = {key: value for key, value in asdict(record.action).items() if value}
-    return {**fields, "start": round(record.start_s, 3), "end": round(record.end_s, 3)}
+    failed = {"failed": True} if record.failed else {}
+    return {**fields, "start": round(record.start_s, 3), "end": round(record.end_s, 3), **failed}

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from dr_eureka.bench import catch_localisation, catch_network, catch_prediction, catch_rates, catch_strip
+from dr_eureka.bench import (
+    catch_curves,
+    catch_localisation,
+    catch_network,
+    catch_prediction,
+    catch_rates,
+    catch_reach,
+    catch_strip,
+)
 from dr_eureka.bench.report import BenchOptions, Row
+
+_PARTS = (catch_localisation, catch_network, catch_prediction, catch_rates, catch_reach, catch_curves)
 
 
 def run(options: BenchOptions) -> list[Row]:
     """Measure; `trials` is the number of balls, places or flights of each series instead of each one's own."""
-    rows = catch_localisation.rows(options) + catch_network.rows(options)
-    rows += catch_prediction.rows(options) + catch_rates.rows(options)
+    rows = [row for part in _PARTS for row in part.rows(options)]
     if options.out is not None:
         catch_strip.draw(options)
     return rows

@@ -68,4 +68,9 @@ def _draw_errors(axes: Axes, parallax: Sequence[Measured], size: Sequence[Measur
             errors = 1000 * np.abs(found - depths)
             label = f"{name}: mean {errors.mean():.1f} mm"
             axes.semilogy(1000 * depths, np.maximum(errors, 1e-2), mark, ms=4, color=colour, label=label)
-    axes.set(xlabel="depth [mm]", ylabel="error in depth [mm]", title="Errors (the paper's means: parallax 10, size 13 mm)")
+    # Below the points there is room for the legend.
+    axes.set_ylim(bottom=1e-3)
+    axes.set(
+        xlabel="depth [mm]", ylabel="error in depth [mm], 0.01 and less at 0.01",
+        title="Errors (the paper's means: parallax 10, size 13 mm)",
+    )

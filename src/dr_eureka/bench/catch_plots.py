@@ -1,4 +1,4 @@
-"""Plots of predictions and catches (paper Figures 11 and 12, and where it breaks down)."""
+"""Plots of predictions (paper Figures 11 and 12)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from dr_eureka.bench.catch_flights import Flight, Step
-from dr_eureka.bench.report import Row
 from dr_eureka.catching.ball_track import BALLISTIC, PAPER_THROWN, BallTrack, View
 from dr_eureka.catching.catcher_settings import THROWN, CatcherSettings
 from dr_eureka.catching.prediction import LEAST_POINTS, PredictionRefused
@@ -25,7 +24,7 @@ _NAMES = {PAPER_THROWN: "paper's fit", BALLISTIC: "ours"}
 
 def plot_paths(file: Path, flight: Flight, saika: SaikaSettings, settings: CatcherSettings) -> None:
     """Draw one flight as Figures 11 and 12 do: observed points, fits after five points and after all, and the truth."""
-    figure, axes = _figure((13, 8.5), 2, rows=2)
+    figure, axes = new_figure((13, 8.5), 2, rows=2)
     plane = settings.stances[THROWN].plane
     times = np.linspace(0.0, flight.time_s, 120)
     truth = flight.at(times)
@@ -43,8 +42,10 @@ def plot_paths(file: Path, flight: Flight, saika: SaikaSettings, settings: Catch
             for row, axis in enumerate((0, 2)):
                 each = axes[row][column]
                 label = f"{_NAMES[method]} after {len(observed)} points"
-                each.plot(fitted[:, 1], fitted[:, axis], color=colour, lw=1.5, label=label)
-                each.plot(end[1], end[axis], "o", color=colour, mfc="none")
+                # Where both agree, the paper's shows beside ours.
+                width = 3.5 if method == PAPER_THROWN else 1.5
+                each.plot(fitted[:, 1], fitted[:, axis], color=colour, lw=width, label=label)
+                each.plot(end[1], end[axis], "o", color=colour, mfc="none", label="  comes down there by this fit")
         for row, axis in enumerate((0, 2)):
             each = axes[row][column]
             each.plot(observed[:, 1], observed[:, axis], "k.", ms=5, label="observed")
@@ -60,12 +61,12 @@ def plot_paths(file: Path, flight: Flight, saika: SaikaSettings, settings: Catch
             each.set_ylim(truth[:, axis].min() - 0.4 * span - 0.05, truth[:, axis].max() + 0.4 * span + 0.05)
             each.grid(alpha=0.3)
             each.legend(fontsize=8)
-    _save(figure, file)
+    figure.savefig(file)
 
 
 def plot_errors(file: Path, tables: Mapping[str, Sequence[Sequence[Step]]]) -> None:
     """Draw median and 90th percentile of the errors of place and time against the number of points."""
-    figure, (place, when) = _figure((13, 4.8), 2)
+    figure, (place, when) = new_figure((13, 4.8), 2)
     for colour, (name, table) in zip(("tab:orange", "tab:red", "tab:blue"), tables.items()):
         by_points: dict[int, list[Step]] = {}
         for step in (step for flight in table for step in flight):
@@ -84,40 +85,7 @@ def plot_errors(file: Path, tables: Mapping[str, Sequence[Sequence[Step]]]) -> N
         axes.set(xlabel="points", yscale="log")
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize=8)
-    _save(figure, file)
-
-
-def plot_curves(file: Path, curves: Mapping[str, tuple[str, Sequence[float], Sequence[Row]]]) -> None:
-    """Draw the share of balls caught against each condition, with 95 % intervals; curves: axis label, values, shares."""
-    figure, axes = _figure((18, 8), 4, rows=2)
-    for unused in np.ravel(axes)[len(curves):]:
-        unused.set_visible(False)
-    for each, (name, (label, values, rows)) in zip(np.ravel(axes), curves.items()):
-        shares = np.array([row.value for row in rows])
-        low, high = np.array([row.interval95 for row in rows]).T
-        # At a share of 1 rounding may put the interval's end below it.
-        bars = np.maximum([shares - low, high - shares], 0.0)
-        each.errorbar(values, shares, bars, fmt="o-", capsize=3, color="tab:blue")
-        each.set(xlabel=label, ylabel="share caught", ylim=(-0.03, 1.05), title=f"{name}, {rows[0].n} balls each")
-        if name == "noise":
-            each.set_xscale("log")
-        each.grid(alpha=0.3)
-    _save(figure, file)
-
-
-def save_strip(file: Path, frames: Sequence[tuple[float, np.ndarray, np.ndarray]], title: str) -> None:
-    """Draw pictures from beside above those of the robot's left camera; frames: seconds since the release, both pictures."""
-    figure, axes = _figure((2.6 * len(frames), 4.6), len(frames), rows=2)
-    for (elapsed_s, beside, seen), upper, lower in zip(frames, *np.atleast_2d(axes)):
-        upper.imshow(beside)
-        upper.set_title(f"{elapsed_s:.2f} s", fontsize=9)
-        lower.imshow(seen)
-        for each in (upper, lower):
-            each.set(xticks=[], yticks=[])
-    axes[0][0].set_ylabel("from beside")
-    axes[1][0].set_ylabel("left camera")
-    figure.suptitle(title, fontsize=10)
-    _save(figure, file)
+    figure.savefig(file)
 
 
 def _add(track: BallTrack, view: View) -> None:
@@ -127,11 +95,8 @@ def _add(track: BallTrack, view: View) -> None:
         pass
 
 
-def _figure(size: tuple[float, float], columns: int, rows: int = 1) -> tuple[Figure, Sequence[Axes]]:
+def new_figure(size: tuple[float, float], columns: int, rows: int = 1) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure of so many inches and its axes."""
     figure = Figure(figsize=size, dpi=_DPI, layout="tight")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns)
-
-
-def _save(figure: Figure, file: Path) -> None:
-    figure.savefig(file)

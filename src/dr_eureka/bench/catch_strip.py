@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
-from dr_eureka.bench.catch_plots import save_strip
-from dr_eureka.bench.catch_rates import Series, conditions_of, throws_of
+from dr_eureka.bench.catch_plots import new_figure
+from dr_eureka.bench.catch_series import Series, conditions_of, draw_ball
 from dr_eureka.bench.catch_trials import CatchRun, Trial
 from dr_eureka.bench.report import BenchOptions
 from dr_eureka.catching.arm_network import SaikaNetwork
 from dr_eureka.catching.catcher_settings import THROWN, CatcherSettings
 from dr_eureka.kinematics.transforms import transform
 from dr_eureka.simulation.saika import SaikaWorld
-from dr_eureka.simulation.throws import REACH, draw_throw
 
 # Since the release [s]; the last ones show the look into the basket.
 _TIMES_S = (0.05, 0.2, 0.35, 0.5, 0.65, 0.9, 1.7)
@@ -24,7 +26,7 @@ def draw(options: BenchOptions) -> Trial:
     """Catch the seed's first thrown ball with rendered pictures, and write catch_strip.png."""
     series = Series(THROWN, rendered=True, to_the_end=True)
     conditions = conditions_of(series)
-    throw = draw_throw(throws_of(series), REACH, np.random.default_rng([options.seed, 4, 0]))
+    throw = draw_ball(series, options.seed, 0)
     run = CatchRun(conditions, CatcherSettings.load(), SaikaNetwork.load(conditions.saika), options.seed * 100_003)
     due, frames = list(_TIMES_S), []
 
@@ -36,8 +38,23 @@ def draw(options: BenchOptions) -> Trial:
 
     trial = run.run(throw, watch)
     said = trial.report.result if trial.report else "nothing"
-    save_strip(options.out / "catch_strip.png", frames, f"one catch: referee {trial.verdict}, robot {said}")
+    _save(options.out / "catch_strip.png", frames, f"one catch: referee {trial.verdict}, robot {said}")
     return trial
+
+
+def _save(file: Path, frames: Sequence[tuple[float, np.ndarray, np.ndarray]], title: str) -> None:
+    """Draw pictures from beside above those of the left camera; frames: seconds since the release, both pictures."""
+    figure, axes = new_figure((2.6 * len(frames), 4.6), len(frames), rows=2)
+    for (elapsed_s, beside, seen), upper, lower in zip(frames, *axes):
+        upper.imshow(beside)
+        upper.set_title(f"{elapsed_s:.2f} s", fontsize=9)
+        lower.imshow(seen)
+        for each in (upper, lower):
+            each.set(xticks=[], yticks=[])
+    axes[0][0].set_ylabel("from beside")
+    axes[1][0].set_ylabel("left camera")
+    figure.suptitle(title, fontsize=10)
+    figure.savefig(file)
 
 
 def _looking(place: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -81,7 +81,9 @@ class CatchRun:
         self._world.throw_ball(throw.position, throw.velocity)
         verdict = self._world.referee()
         while self._world.time_s - released_s < _LIMIT_S:
-            if verdict.result != FLYING and (self._catcher.reports or not self._conditions.to_the_end):
+            # A robot that still watches once the ball has come down saw none, and will say nothing of it.
+            said = self._catcher.reports or self._catcher.phase == CatchPhase.WATCHING
+            if verdict.result != FLYING and (said or not self._conditions.to_the_end):
                 break
             if watch is not None:
                 watch(self._world, self._world.time_s - released_s)

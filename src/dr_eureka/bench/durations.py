@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import accumulate, groupby
 from pathlib import Path
@@ -46,15 +47,20 @@ def read_games(file: Path) -> list[dict[str, Any]]:
 def measure(games: Iterable[Mapping[str, Any]]) -> dict[Key, Figure]:
     """Return mean durations [s, rounded to 10 ms] and in how many actions, by their place in config/planner.yaml.
 
+    Actions that a fault ended do not count; how many picks and places that were stands beside those that went well.
+
     What a game tells as one action may be two: a place right after a pour begins with bringing the tubes upright, a
     strategy's last place ends with the hands at home, a pour begins with bringing the tubes together unless they are. These
     parts are told apart by least squares; those that cannot be told apart are left out. So is a game's last action unless
     the game was solved, for it may be unfinished.
     """
     samples: list[tuple[tuple[Key, ...], float]] = []
+    failed: Counter[Key] = Counter()
     for game in games:
         timed = [action for actions in _strategies(game["actions"]) for action in _timed(actions, game["pour"])]
-        samples += timed if game.get("solved") else timed[:-1]
+        done = timed if game.get("solved") else timed[:-1]
+        samples += [(parts, seconds) for parts, seconds, well in done if well]
+        failed.update(part for parts, _, well in timed if not well for part in parts)
     keys = sorted({part for parts, _ in samples for part in parts}, key=str)
     if not keys:
         return {}
@@ -62,11 +68,12 @@ def measure(games: Iterable[Mapping[str, Any]]) -> dict[Key, Figure]:
     means, *_ = np.linalg.lstsq(seen, np.array([seconds for _, seconds in samples]), rcond=None)
     told_apart = np.abs(null_space(seen)).sum(axis=1) < 1e-6
     trials = seen.sum(axis=0).astype(int)
-    return {
-        ("durations", *key): {"seconds": round(float(mean), 2), "trials": int(count)}
-        for key, mean, count, apart in zip(keys, means, trials, told_apart)
-        if apart
-    }
+    figures = {}
+    for key, mean, count, apart in zip(keys, means, trials, told_apart):
+        if apart:
+            figure = {"seconds": round(float(mean), 2), "trials": int(count)}
+            figures["durations", *key] = {**figure, "failed": failed[key]} if key[0] in ("pick", "place") else figure
+    return figures
 
 
 def _strategies(actions: list[Mapping[str, Any]]) -> Iterator[list[Mapping[str, Any]]]:
@@ -83,8 +90,8 @@ def _strategies(actions: list[Mapping[str, Any]]) -> Iterator[list[Mapping[str, 
         yield [action for _, action in group]
 
 
-def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[tuple[Key, ...], float]]:
-    """Yield of each action what it was made of, by its place under `durations`, and its duration [s].
+def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[tuple[Key, ...], float, bool]]:
+    """Yield of each action what it was made of, by its place under `durations`, its duration [s], and whether it went well.
 
     Actions of both hands at once begin and end together; each counts as lasting that long.
     """
@@ -103,5 +110,5 @@ def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[tupl
                 parts += [("place", hand, tube)] + ([("home",)] if actions[-1] in under_way else [])
             else:
                 parts += [("pour", method, action["count"])] + ([] if again else [("ready", method, tube)])
-            yield tuple(parts), action["end"] - start
+            yield tuple(parts), action["end"] - start, not action.get("failed", False)
         before = under_way[-1]

@@ -6,6 +6,7 @@ import numpy as np
 
 from dr_eureka.kinematics.arms import arm_chain
 from dr_eureka.kinematics.chain import Chain
+from dr_eureka.kinematics.jacobian_step import damped_steps
 from dr_eureka.kinematics.samples import pose_errors
 from dr_eureka.kinematics.transforms import rotations_from_vectors
 
@@ -58,12 +59,11 @@ def witnesses(chain: Chain, targets: np.ndarray, rng: np.random.Generator) -> np
             errors = pose_errors(poses, targets[open_ones[moving]])
             reached = np.abs(errors).max(axis=1) < _REACHED
             found[open_ones[moving[reached]]] = joints[moving[reached]]
-            moving, errors, jacobians = moving[~reached], errors[~reached], np.ascontiguousarray(jacobians[~reached])
+            moving, errors, jacobians = moving[~reached], errors[~reached], jacobians[~reached]
             if not len(moving):
                 break
-            size = np.minimum(np.linalg.norm(errors, axis=1), 1.0)[:, None, None]
-            squares = jacobians @ jacobians.transpose(0, 2, 1) + (_DAMPING * size) ** 2 * np.eye(6)
-            step = np.einsum("nij,ni->nj", jacobians, np.linalg.solve(squares, errors[..., None])[..., 0])
+            size = np.minimum(np.linalg.norm(errors, axis=1), 1.0)
+            step = damped_steps(jacobians, errors, (_DAMPING * size) ** 2)
             joints[moving] = chain.clip(joints[moving] + np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
         open_ones = open_ones[moving]
         if not len(open_ones):

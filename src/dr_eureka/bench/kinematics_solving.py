@@ -107,10 +107,9 @@ def _method_rows(start: str, method: str, measured: dict[tuple[str, str], Trials
         Row(f"{name}: position error, largest", 1000.0 * float(trials.shift.max()), "mm", count),
         Row(f"{name}: turn error, largest", float(np.degrees(trials.turn.max())), "degrees", count),
     ]
-    for figure, unit in (("cycles", "cycles"), ("commanded", "s")):
+    for figure, title, unit in (("cycles", "cycles", "cycles"), ("commanded", "commanded time", "s")):
         values = getattr(trials, figure)
         if np.isfinite(values).all():
-            title = {"cycles": "cycles", "commanded": "commanded time"}[figure]
             other = getattr(measured[against, start], figure) if against else None
             rows.append(
                 mean_row(

@@ -25,7 +25,6 @@ _TITLES = {"joint_change": "random joint change", "straight": "straight step"}
 _PAPER_SAMPLES = 10_000_000
 _TIMED_SAMPLES = 60_000
 
-
 #: Position errors (n,) [m] after one step, by test, size [m] and method.
 StepTable = Mapping[tuple[str, float, str], np.ndarray]
 
@@ -58,14 +57,14 @@ def measure_steps(seed: int, trials: int | None, settings: SampleSettings = Samp
     return errors
 
 
-def step_rows(table: StepTable, where: str = "", judged: bool = True) -> list[Row]:
+def step_rows(table: StepTable, where: str = "") -> list[Row]:
     """Return a row for each test, size and method; `where` goes into the names."""
     rows = []
     for (test, size, method), errors in table.items():
         mean, goal, ok = 100.0 * float(errors.mean()), None, None
-        if judged and method == "network" and test == "joint_change":
+        if method == "network" and test == "joint_change":
             goal, ok = f"<= {LARGEST_MEAN_CM} cm", mean <= LARGEST_MEAN_CM
-        elif judged and method == "network" and size >= BETTER_FROM:
+        elif method == "network" and size >= BETTER_FROM:
             other = 100.0 * float(table[test, size, "pseudo_inverse"].mean())
             goal, ok = "< pseudo_inverse", mean < other
         paper = None

@@ -1,4 +1,4 @@
-"""config/planner.yaml told of what was measured; its comments and all other figures stay as they are."""
+"""Settings in yaml told of what was measured; their comments and all other figures stay as they are."""
 from __future__ import annotations
 
 import io
@@ -11,7 +11,7 @@ from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.planner_settings import PLANNER_FILE, planner_settings
 from dr_eureka.resources import resource_path
 
-#: Place of a figure in config/planner.yaml, such as ("durations", "pick", "from_home", "left", "center").
+#: Place of a figure in a yaml such as config/planner.yaml: ("durations", "pick", "from_home", "left", "center").
 Key = tuple[Union[str, int], ...]
 #: What stands there, such as {"seconds": 4.89, "trials": 13}.
 Figure = Mapping[str, Union[float, int]]
@@ -29,7 +29,7 @@ def figure_at(content: Any, key: Key) -> Optional[Figure]:
 
 
 def rewrite(text: str, figures: Mapping[Key, Figure]) -> str:
-    """Return the text of config/planner.yaml with figures that it has replaced by others."""
+    """Return the text of a yaml with figures that it has replaced by others."""
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = 4096

@@ -4,18 +4,15 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
-from math import radians
 
 import numpy as np
 
-from dr_eureka.bench.pour_rounds import Trial, lock_kinds, run_rounds
-from dr_eureka.bench.pour_spread import Spread
+from dr_eureka.bench.pour_rounds import Trial, every_kind, fewer_kinds, lock_kinds, run_rounds
+from dr_eureka.bench.pour_spread import STATED, WIDE
 from dr_eureka.bench.pour_trials import PourTrial
 from dr_eureka.bench.report import BenchOptions, Row, mean_row, share_row
 
 ROUNDS = 100
-STATED = Spread(materials=0.20, placement=0.003, grasp=0.001, tilt=radians(1.0), timing=0.002)
-WIDE = Spread(materials=0.50, placement=0.003, grasp=0.002, tilt=radians(2.0), timing=0.002)
 # Share of right pours by balls before and balls to pour, of 10 each (Table 2).
 TABLE_2 = {(4, 1): 0.9, (4, 2): 0.9, (4, 3): 0.8, (3, 1): 0.9, (3, 2): 0.9, (2, 1): 1.0}
 LEAST_PROFILED = 0.99
@@ -26,11 +23,12 @@ def run(options: BenchOptions) -> list[Row]:
     """Return the rows at the stated and at the wide spread; with `out`, plots and the trials for `measure_pours` too."""
     rounds = options.trials or ROUNDS
     began = time.perf_counter()
-    stated = run_rounds(STATED, options.seed, rounds, options.processes, "pours")
-    wide = run_rounds(WIDE, options.seed, rounds, options.processes, "pours, wide spread")
+    stated = run_rounds(STATED, options.seed, rounds, every_kind, options.processes, "pours")
+    wide = run_rounds(WIDE, options.seed, rounds, fewer_kinds, options.processes, "pours, wide spread")
     minutes = (time.perf_counter() - began) / 60.0
     rows = rows_of(stated) + wide_rows(wide)
-    rows.append(Row("pours tried a minute, wall time", (len(stated) + len(wide)) / minutes, "1/min", len(stated) + len(wide)))
+    tried = len(stated) + len(wide)
+    rows.append(Row("pours tried a minute, wall time", tried / minutes, "1/min", tried))
     if options.out is not None:
         from dr_eureka.bench.pour_plots import draw_plots, draw_strips
 
@@ -66,7 +64,8 @@ def wide_rows(trials: Sequence[Trial]) -> list[Row]:
     for method in ("profiled", "linear"):
         for held, count in TABLE_2:
             tried = _chosen(trials, method, held, count)
-            rows.append(share_row(f"wide spread: {method}: {count} of {held}", sum(trial.right for trial in tried), len(tried)))
+            right = sum(trial.right for trial in tried)
+            rows.append(share_row(f"wide spread: {method}: {count} of {held}", right, len(tried)))
     locked = [trial for trial in trials if trial.kind.method == "lock"]
     rows.append(share_row("wide spread: lock, all kinds", sum(trial.right for trial in locked), len(locked)))
     rows.append(Row("wide spread: balls lost", sum(trial.lost for trial in trials), "balls", len(trials)))
@@ -100,8 +99,9 @@ def _direct_row(method: str, held: int, count: int, tried: Sequence[Trial]) -> R
 
 def _share(name: str, tried: Sequence[Trial], least: float | None, paper: float | None) -> Row:
     right = sum(trial.right for trial in tried)
-    goal = None if least is None else f">= {least:g}"
-    return share_row(name, right, len(tried), goal=goal, ok=None if least is None else right >= least * len(tried), paper=paper)
+    if least is None:
+        return share_row(name, right, len(tried), paper=paper)
+    return share_row(name, right, len(tried), goal=f">= {least:g}", ok=right >= least * len(tried), paper=paper)
 
 
 def _seconds_row(method: str, seconds: Sequence[float]) -> Row:

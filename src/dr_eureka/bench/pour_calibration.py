@@ -1,33 +1,51 @@
 """When a direct pour must turn back so that just so many balls pass, found on the robot's own arms in simulation.
 
-How many balls pass grows with the time until the tube turns back. For each number of balls the search finds, by bisection, when it
-is first reached; between that and the next one's, in the middle, is where a pour stands farthest from going wrong.
+Over some grasps, drawn at the stated spread, every turn of a grid is tried with a full tube. For each number of balls the turn is
+taken at which most grasps poured just so many. Where the first ball that stays behind starts does not depend on how many there were
+above it, so that one search serves pours out of fuller and emptier tubes.
 """
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dr_eureka.bench.pour_rig import PourKind, PourRig
+import numpy as np
+
+from dr_eureka.bench.pour_rig import PourKind, Poured
+from dr_eureka.bench.report import progress
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.errors import DrEurekaError
+from dr_eureka.game.hands import HANDS
 from dr_eureka.game.state import TUBE_CAPACITY
 
-# Of the searches: earliest and latest turn and how finely it is found, in steps for linear and in ms for profiled.
-LINEAR_STEPS = (60, 330, 3)
-PROFILED_MS = (40, 400, 2)
-# Nothing goes wrong with a later turn where all balls shall pass: so much later than the last one needs.
-LATER_FOR_ALL = 1.5
+# When to turn back: steps for linear, ms for profiled; finely where one ball more passes every few, coarsely where all do.
+TURNS = {
+    "profiled": (*range(70, 170, 3), *range(170, 400, 15)),
+    "linear": (*range(135, 240, 3), *range(240, 400, 15)),
+}
+# A turn is judged with its neighbours, as a pour may be timed a little wrongly.
+_WEIGHTS = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 
 
 class PourCalibrationError(DrEurekaError):
     """A pour that no turn can bring about, or notes of a search that cannot be read."""
 
 
+@dataclass(frozen=True)
+class Turn:
+    """When to turn back, and the share of grasps with which just as many balls passed as were meant to."""
+
+    at: int
+    share: float
+
+
 class Notes:
-    """What was tried and how many balls passed, kept in a file of one JSON object a line, so that a search can go on later."""
+    """What was tried and how many balls passed, in a file of one JSON object a line, so that a search can go on later.
+
+    Raises PourCalibrationError for a file that holds something else.
+    """
 
     def __init__(self, file: Path | None):
         self._file = file
@@ -36,63 +54,75 @@ class Notes:
             for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
                 try:
                     note = json.loads(line)
-                    self._arrived[note["pour"], note["held"], note["turn"]] = note["arrived"]
+                    self._arrived[note["pour"], note["grasp"], note["turn"]] = note["arrived"]
                 except (ValueError, TypeError, KeyError) as error:
-                    raise PourCalibrationError(f"{file}:{number}: {error!r}; expected a note of a search, or no file") from error
+                    problem = f"{file}:{number}: {error!r}; expected a note of a search, or no file"
+                    raise PourCalibrationError(problem) from error
 
-    def arrived(self, method: str, held: int, turn: int, attempt: Callable[[], int]) -> int:
-        """Return how many of `held` balls passed with that turn, trying it if nobody has."""
-        key = method, held, turn
+    def arrived(self, method: str, grasp: int, turn: int, attempt: Callable[[], Poured]) -> int:
+        """Return how many balls passed with that turn, -1 where one was lost, trying it if nobody has."""
+        key = method, grasp, turn
         if key not in self._arrived:
-            self._arrived[key] = attempt()
+            poured = attempt()
+            self._arrived[key] = -1 if poured.lost else poured.arrived
             if self._file is not None:
                 with self._file.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps({"pour": method, "held": held, "turn": turn, "arrived": self._arrived[key]}) + "\n")
+                    note = {"pour": method, "grasp": grasp, "turn": turn, "arrived": self._arrived[key]}
+                    file.write(json.dumps(note) + "\n")
         return self._arrived[key]
 
 
-def linear_steps(rig: PourRig, control: ControlSettings, notes: Notes) -> dict[int, dict[int, int]]:
-    """Return the return step by balls before and balls to pour; raises PourCalibrationError."""
+def search(make_rig: Callable[[int], object], control: ControlSettings, grasps: int, notes: Notes) -> dict[str, dict[int, Turn]]:
+    """Return by method, then by how many balls stay behind, when to turn back; raises PourCalibrationError.
 
-    def attempt(held: int, turn: int) -> int:
-        linear = replace(control.linear_pour, return_steps={held: {held: turn}})
-        return rig.pour(PourKind("linear", "left", held, held, 0), replace(control, linear_pour=linear)).arrived
+    `make_rig`: gives the PourRig with the grasp of that number; it is only asked for where something is left to try.
+    """
+    arrived = {method: np.zeros((len(turns), grasps), dtype=int) for method, turns in TURNS.items()}
+    for grasp in progress(iter(range(grasps)), grasps, "grasps"):
+        rigs: list = []
+        for method, turns in TURNS.items():
+            for row, turn in enumerate(turns):
 
+                def attempt() -> Poured:
+                    if not rigs:
+                        rigs.append(make_rig(grasp))
+                    kind = PourKind(method, HANDS[grasp % len(HANDS)], TUBE_CAPACITY, TUBE_CAPACITY, 0)
+                    return rigs[0].pour(kind, told(control, {method: {0: turn}}))
+
+                arrived[method][row, grasp] = notes.arrived(method, grasp, turn, attempt)
+    return {method: best_turns(method, turns, arrived[method]) for method, turns in TURNS.items()}
+
+
+def best_turns(method: str, turns: Sequence[int], arrived: np.ndarray) -> dict[int, Turn]:
+    """Return when to turn back by how many balls stay behind, of a full tube; raises PourCalibrationError.
+
+    `arrived` (k, n): how many balls passed at each of k turns with each of n grasps, -1 where one was lost. Of equally good
+    turns in a row it is the middle one; the first one where all balls shall pass, as turning later only takes longer.
+    """
     found = {}
-    for held in range(1, TUBE_CAPACITY + 1):
-        turns = _turns(lambda turn: notes.arrived("linear", held, turn, lambda: attempt(held, turn)), held, *LINEAR_STEPS)
-        found[held] = {count: round(turn) for count, turn in turns.items()}
+    for staying in range(TUBE_CAPACITY):
+        shares = np.mean(arrived == TUBE_CAPACITY - staying, axis=1)
+        judged = np.convolve(np.pad(shares, len(_WEIGHTS) // 2, mode="edge"), _WEIGHTS, mode="valid")
+        if shares.max() == 0.0:
+            problem = f"{method}: no turn between {turns[0]} and {turns[-1]} leaves just {staying} of {TUBE_CAPACITY} balls behind"
+            raise PourCalibrationError(f"{problem}; expected one that does")
+        first = last = int(np.argmax(judged))
+        while last + 1 < len(judged) and judged[last + 1] >= judged[first] - 1e-9:
+            last += 1
+        best = first if staying == 0 else (first + last) // 2
+        found[staying] = Turn(turns[best], float(shares[best]))
     return found
 
 
-def profiled_seconds(rig: PourRig, control: ControlSettings, notes: Notes) -> dict[int, float]:
-    """Return how long [s] the dip lasts by the number of balls that stay behind; raises PourCalibrationError."""
-
-    def attempt(turn: int) -> int:
-        profiled = replace(control.profiled_pour, dip_seconds={0: turn / 1000.0})
-        return rig.pour(PourKind("profiled", "left", TUBE_CAPACITY, TUBE_CAPACITY, 0), replace(control, profiled_pour=profiled)).arrived
-
-    turns = _turns(lambda turn: notes.arrived("profiled", TUBE_CAPACITY, turn, lambda: attempt(turn)), TUBE_CAPACITY, *PROFILED_MS)
-    return {staying: round(turns[TUBE_CAPACITY - staying] / 1000.0, 4) for staying in range(TUBE_CAPACITY)}
-
-
-def _turns(arrived: Callable[[int], int], held: int, first: int, last: int, resolution: int) -> Mapping[int, float]:
-    """Return the turn for each number of balls to pour, 1 to `held`."""
-    edges = {count: _edge(arrived, count, first, last, resolution) for count in range(1, held + 1)}
-    return {
-        count: LATER_FOR_ALL * edge if count == held else (edge + edges[count + 1]) / 2.0 for count, edge in edges.items()
-    }
-
-
-def _edge(arrived: Callable[[int], int], count: int, too_early: int, late_enough: int, resolution: int) -> float:
-    """Return the turn from which on at least `count` balls pass, halving what is left of the range until it is found."""
-    if arrived(late_enough) < count:
-        raise PourCalibrationError(f"turning at {late_enough}, fewer than {count} balls pass; expected that all do by then")
-    low, high = too_early // resolution, late_enough // resolution
-    while high - low > 1:
-        middle = (low + high) // 2
-        if arrived(middle * resolution) >= count:
-            high = middle
-        else:
-            low = middle
-    return (low + high) * resolution / 2.0
+def told(control: ControlSettings, turns: Mapping[str, Mapping[int, int]]) -> ControlSettings:
+    """Return settings of pours that turn back as they are told, by method and by how many balls stay behind."""
+    if "profiled" in turns:
+        seconds = {staying: turn / 1000.0 for staying, turn in turns["profiled"].items()}
+        control = replace(control, profiled_pour=replace(control.profiled_pour, dip_seconds=seconds))
+    if "linear" in turns:
+        steps = {
+            held: {held - staying: turn for staying, turn in sorted(turns["linear"].items(), reverse=True) if staying < held}
+            for held in range(1, TUBE_CAPACITY + 1)
+        }
+        control = replace(control, linear_pour=replace(control.linear_pour, return_steps=steps))
+    return control

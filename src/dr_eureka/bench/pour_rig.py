@@ -1,16 +1,17 @@
 """Both tubes in the robot's hands, again and again: the bench on which pours are tried, calibrated and counted.
 
 A world is made with the tubes between the open fingers, where a pick would have brought the hands; from there on all that
-happens is the robot's doing: the fingers close, the arms lift and bring the tubes together, and pour. What is tried after that
-starts from the world as it then was, so that many pours share one grasp.
+happens is the robot's doing: the fingers close, the arms lift and bring the tubes together, and pour. What is tried after
+that starts from the world as it then was, so that many pours share one grasp.
 """
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dr_eureka.bench.pour_places import nominal_feet, scattered
 from dr_eureka.bench.pour_spread import Spread
 from dr_eureka.control.body import Held
 from dr_eureka.control.codes import ControlError, EngineCode
@@ -57,15 +58,26 @@ class Poured:
     seconds: float
 
 
+@dataclass(frozen=True)
+class _Moment:
+    """The world at a moment, the joint goals [rad] then, and what the body knew of the pour: see `control.body.Body`."""
+
+    world: Snapshot
+    goals: dict[str, float]
+    pour_ready: tuple[str, str] | None
+    upright: dict[str, np.ndarray]
+
+
 class PourRig:
     """One grasp of both tubes, drawn from a seed, and pours from there; raises ControlError when the grasp itself fails.
 
-    Source: the trials of paper 4.4, Table 2, with the spread that issue 7 states.
+    `feet`: by hand, where the robot believes that the tubes stand (3,) [m] in base; by default their nominal places.
+    Source: the trials of paper 4.4, Table 2.
     """
 
     def __init__(
         self, control: ControlSettings, world: WorldSettings, pieces: Pieces, spread: Spread, seed: int, stage: Stage,
-        camera: CameraSettings | None = None,
+        camera: CameraSettings | None = None, feet: Mapping[str, np.ndarray] | None = None,
     ):
         self._control, self._pieces, self._spread = control, pieces, spread
         self._rng = np.random.default_rng((seed, 7))
@@ -73,7 +85,7 @@ class PourRig:
         """By hand, how far [rad] the tube in it leans to how it is believed to."""
         engine = ControlEngine(control, pieces)
         self.body, self._ranges = engine.body, engine.ranges
-        feet = {hand: np.array([*world.layout.tubes_in_sheet[hand], 0.0]) + world.layout.sheet_centre for hand in HANDS}
+        feet = feet or nominal_feet(world)
         self.world = World(self._laid_out(world, feet), seed, START_OF_TRIALS, pieces=pieces, camera=camera, stage=stage)
         joints = self.world.joint_positions()
         self.body.goals = {name: joints[name] for name in CONTROLLED_JOINTS}
@@ -81,10 +93,10 @@ class PourRig:
         self._limiter = self._fresh_limiter()
         self._run(self._grasp(feet))
         self._lifted = self._moment()
-        self._ready: dict[tuple[str, str], tuple[Snapshot, dict, tuple[str, str] | None, dict]] = {}
+        self._ready: dict[tuple[str, str], _Moment] = {}
 
-    def _laid_out(self, world: WorldSettings, feet: dict[str, np.ndarray]) -> WorldSettings:
-        """Return a world with the open fingers round tubes that stand a little beside `feet` (3,) [m]."""
+    def _laid_out(self, world: WorldSettings, feet: Mapping[str, np.ndarray]) -> WorldSettings:
+        """Return a world with the open fingers round where the tubes are believed to stand, `feet` (3,) [m]."""
         pick, grip = self._control.pick, self._control.grip
         start = {"head_p": 0.42}
         for hand, foot in feet.items():
@@ -92,14 +104,13 @@ class PourRig:
             yaw = pick.approach_yaw if hand == "left" else -pick.approach_yaw
             pose = level_hand(foot + pick.grip_height * UP, yaw, pick.centre_beyond_end)
             rest = arm.posture(self._control.postures.pick)
-            start |= dict(zip(arm.joints, arm.solve(rest, pose, EngineCode.UNREACHABLE_TUBE, f"the {hand} tube", rest).tolist()))
+            angles = arm.solve(rest, pose, EngineCode.UNREACHABLE_TUBE, f"the {hand} tube", rest)
+            start |= dict(zip(arm.joints, angles.tolist()))
             start[grip_joint(hand)] = grip.open
-        scatter = replace(
-            world.scatter, sheet=0.0, sheet_yaw=0.0, tubes=self._spread.placement, materials=self._spread.materials
-        )
-        return replace(world, layout=replace(world.layout, start_joints=start), scatter=scatter)
+        world = scattered(world, self._spread)
+        return replace(world, layout=replace(world.layout, start_joints=start))
 
-    def _grasp(self, feet: dict[str, np.ndarray]) -> Iterator[Motion]:
+    def _grasp(self, feet: Mapping[str, np.ndarray]) -> Iterator[Motion]:
         """Close both hands and lift, as two picks do."""
         control, body = self._control, self.body
         joints = tuple(grip_joint(hand) for hand in HANDS)
@@ -112,10 +123,9 @@ class PourRig:
             arm = body.arms[hand]
             end_from_tube = tube_in_hand(arm.pose(body.joints), feet[hand])
             body.held[hand] = Held(hand, end_from_tube @ self._misjudged(hand))
-            start, lift = body.commanded(hand), control.pick.lift * UP
-            line = arm.line(
-                start, lift, control.pick.way_point_spacing, control.speeds.line, control.speeds.carry, EngineCode.UNREACHABLE_TUBE, hand
-            )
+            start, lift, spacing = body.commanded(hand), control.pick.lift * UP, control.pick.way_point_spacing
+            speeds = control.speeds
+            line = arm.line(start, lift, spacing, speeds.line, speeds.carry, EngineCode.UNREACHABLE_TUBE, hand)
             lines.append((arm.joints, line))
         yield Follow(tuple(lines))
 
@@ -131,7 +141,10 @@ class PourRig:
     def pour(
         self, kind: PourKind, settings: ControlSettings | None = None, each_cycle: Callable[[float], None] | None = None
     ) -> Poured:
-        """Pour once from the ready pose of that kind and count, with the rig's own or other settings; raises ControlError."""
+        """Pour once from the ready pose of that kind and count, with the rig's own or other settings.
+
+        `each_cycle` gets the time since the pour began [s] in each control cycle. Raises ControlError.
+        """
         self.body.settings = settings or self._control
         target_hand = next(hand for hand in HANDS if hand != kind.hand)
         self._make_ready(kind, target_hand)
@@ -173,19 +186,20 @@ class PourRig:
                 self.world.put_ball(next(balls), pose[:3, 3] + along * pose[:3, 2] + aside)
         self._wait(SETTLE_S)
 
-    def _moment(self):
-        return self.world.remember(), dict(self.body.goals), self.body.pour_ready, dict(self.body.upright)
+    def _moment(self) -> _Moment:
+        return _Moment(self.world.remember(), dict(self.body.goals), self.body.pour_ready, dict(self.body.upright))
 
-    def _back_to(self, moment) -> None:
-        snapshot, goals, self.body.pour_ready, upright = moment
-        self.world.go_back(snapshot)
-        self.body.goals, self.body.upright = dict(goals), dict(upright)
+    def _back_to(self, moment: _Moment) -> None:
+        self.world.go_back(moment.world)
+        self.body.goals, self.body.upright = dict(moment.goals), dict(moment.upright)
+        self.body.pour_ready = moment.pour_ready
         self.body.joints = self.world.joint_positions()
         self._limiter = self._fresh_limiter()
 
     def _fresh_limiter(self) -> CommandLimiter:
         speeds = self._control.speeds
-        limiter = CommandLimiter({name: JointLimit(*ends, speeds.hardware) for name, ends in self._ranges.items()}, speeds.longest_step)
+        limits = {name: JointLimit(*ends, speeds.hardware) for name, ends in self._ranges.items()}
+        limiter = CommandLimiter(limits, speeds.longest_step)
         limiter.reset(self.world.time_s, self.body.goals)
         return limiter
 

@@ -1,17 +1,20 @@
 """Rounds of pours: in each, the tubes are grasped once and every kind of pour is tried from there.
 
-Each round has its own random numbers, drawn from seed and number, so that the outcome does not depend on how many processes share
-the work. The rounds of one kind of pour are independent of one another.
+Each round has its own random numbers, drawn from seed and number, so that the outcome does not depend on how many processes
+share the work. The rounds of one kind of pour are independent of one another.
 """
 from __future__ import annotations
 
 import multiprocessing
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
+from dr_eureka.bench.pour_places import PourPlacesError, located_feet, scattered
 from dr_eureka.bench.pour_rig import PourKind, PourRig
 from dr_eureka.bench.pour_spread import Spread, mistimed
 from dr_eureka.bench.report import progress
@@ -21,8 +24,9 @@ from dr_eureka.game.hands import HANDS
 from dr_eureka.game.state import BALLS_PER_COLOUR, COLOURS, TUBE_CAPACITY
 from dr_eureka.pieces import Pieces, load_pieces
 from dr_eureka.resources import load_yaml
-from dr_eureka.simulation.settings import WorldSettings, load_world_settings
+from dr_eureka.simulation.settings import CameraSettings, WorldSettings, load_camera_settings, load_world_settings
 from dr_eureka.simulation.stage import Stage
+from dr_eureka.vision.tubes import TubeSettings
 
 CONTROL = "config/control_engine.yaml"
 BALLS = BALLS_PER_COLOUR * len(COLOURS)
@@ -32,7 +36,8 @@ BALLS = BALLS_PER_COLOUR * len(COLOURS)
 class Trial:
     """A pour that was tried: how far off [rad] the tube that was poured from sat in the hand, and what became of it.
 
-    Without `arrived` it was refused, or the grasp before it: `code` is the engine's.
+    Without `arrived` it was refused, or the grasp before it, or the tubes were not located: `code` is the engine's or one of
+    TubeResult.
     """
 
     kind: PourKind
@@ -62,16 +67,20 @@ def direct_kinds(method: str, hand: str) -> list[PourKind]:
     return sorted(every, key=lambda kind: kind.held == kind.count)
 
 
-def run_rounds(spread: Spread, seed: int, rounds: int, processes: int | None, label: str) -> list[Trial]:
-    """Return the trials of so many rounds, in order; `processes`: how many work, by default one a core."""
-    count = processes or len(os.sched_getaffinity(0))
+def run_rounds(
+    spread: Spread, seed: int, rounds: int, kinds_of: Callable[[int], list[PourKind]], processes: int | None, label: str
+) -> list[Trial]:
+    """Return the trials of so many rounds, in order.
+
+    `kinds_of`: the kinds of pours that a round of that number tries; `processes`: how many work, by default one a core.
+    """
+    count, play = processes or len(os.sched_getaffinity(0)), partial(_round, spread, seed, kinds_of)
     if count == 1:
         _prepare()
-        done = progress(map(partial(_round, spread, seed), range(rounds)), rounds, label)
-        return [trial for trials in done for trial in trials]
+        return list(chain.from_iterable(progress(map(play, range(rounds)), rounds, label)))
     # A fork would share the physics engine's state; a new interpreter starts clean.
     with multiprocessing.get_context("spawn").Pool(count, _prepare) as pool:
-        return [trial for trials in progress(pool.imap(partial(_round, spread, seed), range(rounds)), rounds, label) for trial in trials]
+        return list(chain.from_iterable(progress(pool.imap(play, range(rounds)), rounds, label)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +88,10 @@ class _Bench:
     control: ControlSettings
     world: WorldSettings
     pieces: Pieces
+    camera: CameraSettings
+    tubes: TubeSettings
     stage: Stage
+    seeing_stage: Stage
 
 
 _bench: _Bench | None = None
@@ -90,17 +102,33 @@ def _prepare() -> None:
     global _bench
     if _bench is None:
         control = ControlSettings.from_mapping(load_yaml(CONTROL), CONTROL)
-        _bench = _Bench(control, load_world_settings(), load_pieces(), Stage(None))
+        camera = load_camera_settings()
+        stages = Stage(None), Stage(camera.renderer)
+        _bench = _Bench(control, load_world_settings(), load_pieces(), camera, TubeSettings.load(), *stages)
 
 
-def _round(spread: Spread, seed: int, number: int) -> list[Trial]:
-    # Direct pours change hands from round to round, lock-pours are tried with both in each.
+def every_kind(number: int) -> list[PourKind]:
+    """Return all kinds of pours: the direct ones by one hand, which changes from round to round, the lock-pours by both."""
     hand = HANDS[number % len(HANDS)]
-    kinds = [*direct_kinds("profiled", hand), *direct_kinds("linear", hand), *lock_kinds()]
-    rng = np.random.default_rng((seed, number, 5))
-    bench = _bench
+    return [*direct_kinds("profiled", hand), *direct_kinds("linear", hand), *lock_kinds()]
+
+
+def fewer_kinds(number: int) -> list[PourKind]:
+    """Return the pours of Table 2 and one in four of the lock-pours, other ones from round to round, by one hand."""
+    hand = HANDS[number % len(HANDS)]
+    direct = [kind for method in ("profiled", "linear") for kind in direct_kinds(method, hand) if kind.held > kind.count]
+    locks = [kind for kind in lock_kinds() if kind.hand == hand]
+    return [*direct, *locks[number // len(HANDS) % 4 :: 4]]
+
+
+def _round(spread: Spread, seed: int, kinds_of: Callable[[int], list[PourKind]], number: int) -> list[Trial]:
+    kinds, rng, bench = kinds_of(number), np.random.default_rng((seed, number, 5)), _bench
+    world, world_seed = scattered(bench.world, spread), seed * 1_000_003 + number
     try:
-        rig = PourRig(bench.control, bench.world, bench.pieces, spread, seed * 1_000_003 + number, bench.stage)
+        feet = located_feet(world, world_seed, bench.pieces, bench.camera, bench.tubes, bench.seeing_stage)
+        rig = PourRig(bench.control, world, bench.pieces, spread, world_seed, bench.stage, feet=feet)
+    except PourPlacesError as error:
+        return [Trial(kind, 0.0, error.result) for kind in kinds]
     except ControlError as error:
         return [Trial(kind, 0.0, error.code) for kind in kinds]
     trials = []

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import radians
 
 import numpy as np
 
@@ -12,9 +13,9 @@ from dr_eureka.control.settings import ControlSettings
 class Spread:
     """How far things are off in each trial, evenly drawn between minus and plus these.
 
-    materials: share of friction and of bounce; placement: where a tube stands to where it was located, x and y [m]; grasp and tilt:
-    how a tube sits in the hand to how it is believed to, along [m] and about [rad] the tube's axes; timing: of each stretch of a
-    pour [s].
+    materials: share of friction and of bounce; placement: where a tube stands to its nominal place, x and y [m], from where
+    the robot's camera locates it; grasp and tilt: how a tube sits in the hand to how it is believed to, along [m] and about
+    [rad] the tube's axes, which nothing tells the robot; timing: of each stretch of a pour [s].
     """
 
     materials: float
@@ -25,6 +26,8 @@ class Spread:
 
 
 NONE = Spread(0.0, 0.0, 0.0, 0.0, 0.0)
+STATED = Spread(materials=0.20, placement=0.003, grasp=0.001, tilt=radians(1.0), timing=0.002)
+WIDE = Spread(materials=0.50, placement=0.003, grasp=0.002, tilt=radians(2.0), timing=0.002)
 
 
 def mistimed(settings: ControlSettings, spread: Spread, rng: np.random.Generator) -> ControlSettings:
@@ -37,9 +40,10 @@ def mistimed(settings: ControlSettings, spread: Spread, rng: np.random.Generator
     # Some 150 steps lead down.
     step = linear.step_seconds + late() / 150.0
     shift = late()
+    dips = {staying: seconds + shift for staying, seconds in profiled.dip_seconds.items()}
     return replace(
         settings,
         lock_pour=replace(lock, keyframes=keyframes),
         linear_pour=replace(linear, step_seconds=step),
-        profiled_pour=replace(profiled, dip_seconds={staying: seconds + shift for staying, seconds in profiled.dip_seconds.items()}),
+        profiled_pour=replace(profiled, dip_seconds=dips),
     )

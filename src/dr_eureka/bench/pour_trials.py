@@ -29,7 +29,7 @@ class PourTrialError(DrEurekaError):
 
 @dataclass(frozen=True)
 class PourTrial:
-    """A pour of `count` balls by one of the ways to pour out of a tube that held `held`: how many were poured over, how many lost."""
+    """A pour of `count` balls out of a tube with `held`, by one of the ways to pour: how many arrived, how many were lost."""
 
     pour: str
     held: int = field(metadata=_BALLS)

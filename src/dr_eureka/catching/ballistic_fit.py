@@ -23,6 +23,7 @@ from dr_eureka.catching.prediction import (
     PredictionReason,
     PredictionRefused,
     StampCheck,
+    seconds_until_below,
     too_few,
 )
 
@@ -133,10 +134,7 @@ class BallisticFit:
                 problem = f"depth changes by {speed:.2f} m/s; expected a ball that comes nearer"
                 raise PredictionRefused(PredictionReason.NEVER_CROSSES, problem)
             return gap / speed
-        rest = speed * speed - 2.0 * GRAVITY_M_S2 * gap
-        if rest <= 0.0:
-            raise PredictionRefused(PredictionReason.NEVER_CROSSES, "the ball does not rise to the catching height")
-        return (speed + math.sqrt(rest)) / GRAVITY_M_S2
+        return seconds_until_below(gap, speed)
 
     def _fit(self) -> _Flight | None:
         """Fit all points, leaving out the worst one by one while that is beyond the gate; None if too many are."""

@@ -69,8 +69,9 @@ class CatchReport:
 
 @dataclass(frozen=True)
 class RobotWord:
-    """What the robot says: its phase, how many balls have ended, and how the last one did."""
+    """What the robot says, and of which robot time [s]: its phase, how many balls have ended, and how the last one did."""
 
+    time_s: float
     phase: str
     balls: int = 0
     result: str = ""

@@ -213,7 +213,7 @@ class Catcher:
             catch.late_m = float(np.linalg.norm(there - self._arm.basket_centre(catch.goal)))
         if over_s < self._settings.judging.after_s:
             return
-        if not catch.reachable:
+        if catch.goal is None:
             self._report(catch, CatchResult.OUT_OF_REACH, CatchResult.OUT_OF_REACH)
         else:
             self._phase = CatchPhase.JUDGING
@@ -227,6 +227,8 @@ class Catcher:
             return
         if look.ball_in_basket:
             self._report(catch, CatchResult.CAUGHT, "")
+        elif not catch.reachable:
+            self._report(catch, CatchResult.OUT_OF_REACH, CatchResult.OUT_OF_REACH)
         elif not look.seen:
             self._report(catch, CatchResult.MISSED, CatchReason.BASKET_NOT_SEEN)
         else:

@@ -102,7 +102,7 @@ class Predictor(Protocol):
         """How many points the next prediction rests on."""
 
     def add(self, point: BallPoint) -> None:
-        """Take one more point. Raises PredictionRefused; the path is then what it was."""
+        """Take one more point. Raises PredictionRefused for one on which the path does not rest."""
 
     def predict(self, plane: CatchingPlane) -> Prediction:
         """Return where and when the ball crosses the plane. Raises PredictionRefused."""
@@ -132,6 +132,17 @@ class StampCheck:
             problem = f"point is stamped {point.time_s:.6f} s; expected later than {last_s:.6f} s"
             raise PredictionRefused(PredictionReason.STAMP_NOT_RISING, problem)
         self._last_s[point.source] = point.time_s
+
+
+def seconds_until_below(rise_m: float, speed_m_s: float) -> float:
+    """Return when [s] a ball that goes up at a speed (or down: negative) sinks through a height `rise_m` above it.
+
+    Before now, thus negative, when it already fell through. Raises PredictionRefused (NEVER_CROSSES).
+    """
+    rest = speed_m_s * speed_m_s - 2.0 * GRAVITY_M_S2 * rise_m
+    if rest <= 0.0:
+        raise PredictionRefused(PredictionReason.NEVER_CROSSES, "the ball does not rise to the catching height")
+    return (speed_m_s + math.sqrt(rest)) / GRAVITY_M_S2
 
 
 def too_few(points: int) -> PredictionRefused:

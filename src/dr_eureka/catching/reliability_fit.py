@@ -1,16 +1,10 @@
 """The paper's prediction (section 7): a line and a parabola over depth, the older a point the less it counts.
 
-In the paper's axes (right x, up y, depth z) the path is x = a0 + a1 z and y = b0 + b1 z + b2 z^2, its Equations 3 and 11.
-With the reliability p_i = r^(n-i) of Equation 9 and the basis f = (1, z, z^2), minimising sum p_i (f_i . b - y_i)^2 gives
+In the paper's axes (right x, up y, depth z) the path is x = a0 + a1 z and y = b0 + b1 z + b2 z^2, its Equations 3 and 11,
+solved by `reliability_sums` with f = (1, z, z^2). That is what its Equations 7 and 8, garbled in print, must say (for the
+line: A's first two rows and columns), and in Equation 12 the last term is y_i.
 
-    A b = s,   A = sum p_i f_i f_i^T,   s = sum p_i f_i y_i,
-
-which is what its Equations 7 and 8, garbled in print, must say (for the line: A's first two rows and columns), and in
-Equation 12 the last term is y_i. As Equation 10 has it, every sum follows from the one before: S_n = (term n) + r S_(n-1).
-
-The paper predicts no time. Here depth is a line over time, fitted with the same reliability. The covariances hold for
-points of equal, independent errors: b = A^-1 s has covariance A^-1 (sum p_i^2 f_i f_i^T) A^-1 times the error's variance,
-and the sum of squares has the mean variance * (sum p_i - trace(A^-1 sum p_i^2 f_i f_i^T)), from which it is estimated.
+The paper predicts no time. Here depth is a line over time, fitted with the same reliability.
 """
 
 from __future__ import annotations
@@ -19,95 +13,27 @@ import math
 
 import numpy as np
 
-from dr_eureka.catching.prediction import (
-    LEAST_POINTS,
-    BallPoint,
-    CatchingPlane,
-    Prediction,
-    PredictionReason,
-    PredictionRefused,
-    StampCheck,
-    too_few,
-)
+from dr_eureka.catching.prediction import BallPoint, CatchingPlane, Prediction, PredictionReason, PredictionRefused
+from dr_eureka.catching.reliability_sums import ReliabilitySums, SummedPoints
 
-# A system of equations, scaled to a diagonal of ones, that is worse conditioned is singular.
-_WORST_CONDITION = 1e10
 # Depth that changes by less than so many standard deviations of its speed does not change.
 _LEAST_SPEED_SIGMAS = 3.0
 
 
-class ReliabilitySums:
-    """Recursive weighted least squares of `values` outputs that are polynomials of degree `terms` - 1.
-
-    `reliability` r (0 < r <= 1): what a point's weight is multiplied with whenever another comes (Equations 9 and 10).
-    """
-
-    def __init__(self, terms: int, values: int, reliability: float):
-        if not 0.0 < reliability <= 1.0:
-            raise ValueError(f"reliability is {reliability}; expected 0 < r <= 1")
-        self._reliability = reliability
-        self._matrix = np.zeros((terms, terms))
-        # With the squared weights, for the covariance.
-        self._matrix_of_squares = np.zeros((terms, terms))
-        self._right = np.zeros((terms, values))
-        self._squares = np.zeros(values)
-
-    def add(self, at: float, values: np.ndarray) -> None:
-        """Take the outputs (values,) seen at `at`."""
-        basis = float(at) ** np.arange(len(self._matrix))
-        outer, r = np.outer(basis, basis), self._reliability
-        self._matrix = outer + r * self._matrix
-        self._matrix_of_squares = outer + r * r * self._matrix_of_squares
-        self._right = np.outer(basis, values) + r * self._right
-        self._squares = np.square(values) + r * self._squares
-
-    def solve(self, terms: int, value: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first `terms` coefficients of output number `value`, lowest power first, and their covariance.
-
-        Raises PredictionRefused (DEPTH_CONSTANT) when the points do not determine them.
-        """
-        matrix, squares = self._matrix[:terms, :terms], self._matrix_of_squares[:terms, :terms]
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
-        scaled = matrix * np.outer(scale, scale)
-        if not np.linalg.cond(scaled) < _WORST_CONDITION:
-            problem = f"the points lie at fewer than {terms} depths; expected a ball that comes nearer"
-            raise PredictionRefused(PredictionReason.DEPTH_CONSTANT, problem)
-        inverse = np.linalg.inv(scaled) * np.outer(scale, scale)
-        right = self._right[:terms, value]
-        coefficients = inverse @ right
-        freedom = self._matrix[0, 0] - np.trace(inverse @ squares)
-        error = max(self._squares[value] - coefficients @ right, 0.0)
-        variance = error / freedom if freedom > 1e-9 else math.inf
-        return coefficients, inverse @ squares @ inverse * variance
-
-
-class ReliabilityFit:
+class ReliabilityFit(SummedPoints):
     """The paper's predictor, in our axes: x and z over the depth y."""
 
     def __init__(self, reliability: float):
         """Start without points; `reliability` is r of Equation 9, 0 < r <= 1."""
+        super().__init__()
         self._over_depth = ReliabilitySums(3, 2, reliability)
         self._over_time = ReliabilitySums(2, 1, reliability)
-        self._stamps = StampCheck()
-        self._points = 0
-        # Sums of powers keep their digits when they are taken about a point of the path.
-        self._origin = np.zeros(3)
-        self._origin_s = 0.0
-
-    @property
-    def points(self) -> int:
-        """How many points were taken."""
-        return self._points
 
     def add(self, point: BallPoint) -> None:
         """Take one more point; its covariance does not count here. Raises PredictionRefused."""
-        self._stamps.check(point)
-        if self._points == 0:
-            self._origin, self._origin_s = np.array(point.position, float), point.time_s
-        right, depth, up = point.position - self._origin
+        elapsed_s, (right, depth, up) = self._taken(point)
         self._over_depth.add(depth, np.array([right, up]))
-        self._over_time.add(point.time_s - self._origin_s, np.array([depth]))
-        self._points += 1
+        self._over_time.add(elapsed_s, np.array([depth]))
 
     def line(self) -> tuple[float, float]:
         """Return a0 [m] and a1 of Equation 3, x = a0 + a1 y in `base`. Raises PredictionRefused."""
@@ -153,11 +79,6 @@ class ReliabilityFit:
         depth = approach[0] + approach[1] * (np.asarray(times_s, float) - self._origin_s)
         right, up = line[0] + line[1] * depth, parabola[0] + parabola[1] * depth + parabola[2] * depth**2
         return self._origin + np.stack([right, depth, up], axis=-1)
-
-    def _solved(self, sums: ReliabilitySums, terms: int, value: int) -> tuple[np.ndarray, np.ndarray]:
-        if self._points < LEAST_POINTS:
-            raise too_few(self._points)
-        return sums.solve(terms, value)
 
     def _approach(self) -> tuple[np.ndarray, np.ndarray]:
         """Return depth as a line over time, with its covariance; refuse a depth that does not shrink."""

@@ -35,12 +35,13 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 def _lines(content: Mapping[str, Any], measured: Mapping[Key, Figure]) -> list[str]:
     """Return a table of what the yaml says and what was measured."""
-    lines = [f"{'duration':<36}{'yaml [s]':>10}{'trials':>8}{'games [s]':>12}{'trials':>8}"]
+    lines = [f"{'duration':<36}{'yaml [s]':>10}{'trials':>8}{'games [s]':>12}{'trials':>8}{'failed':>8}"]
     for key, figure in sorted(measured.items(), key=str):
         name = " ".join(map(str, key[1:]))
         told = figure_at(content, key)
+        failed = f"{figure['failed']:>8}" if "failed" in figure else ""
         lines.append(
-            f"{name:<36}{told['seconds']:>10.2f}{told.get('trials', 0):>8}{figure['seconds']:>12.2f}{figure['trials']:>8}"
+            f"{name:<36}{told['seconds']:>10.2f}{told.get('trials', 0):>8}{figure['seconds']:>12.2f}{figure['trials']:>8}{failed}"
         )
     return lines
 

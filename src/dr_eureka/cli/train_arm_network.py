@@ -43,13 +43,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="train_arm_network",
-        description="Train the network that turns a wanted hand step into joint increments, on ten million samples drawn as it goes.",
+        description="Train the network that turns a wanted hand step into joint increments, on ten million samples drawn as "
+        "it goes.",
     )
     parser.add_argument("--out", type=Path, default=Path("arm_network"), metavar="FOLDER",
-                        help="for weights, log and checkpoint; a run that was broken off goes on from there (default: %(default)s)")
+                        help="for weights, log and checkpoint; a run that was broken off goes on from there, if asked for "
+                        "the same (default: %(default)s)")
     parser.add_argument("--install", action="store_true",
                         help="put the finished weights and their log into the package's config/weights")
     parser.add_argument("--rounds", type=int, help="rounds of 31,250 new samples each, by default 320")
     parser.add_argument("--batch", type=int, help="samples a step, by default 1024; the paper: 16384")
-    parser.add_argument("--seed", type=int)
+    parser.add_argument("--seed", type=int, help="seed of the samples and the first weights, by default 1")
     return parser

@@ -24,13 +24,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--model", choices=MODELS, default="eureka",
                         help="eureka: YOLO-Dr. Eureka (default); tiny: YOLOv2-tiny, its baseline")
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER",
-                        help="for weights, log and checkpoint; a run that was broken off goes on from there")
+                        help="for weights, log and checkpoint; a run that was broken off goes on from there, if asked for "
+                        "the same")
     parser.add_argument("--install", action="store_true",
                         help="put the finished weights and their log into the package's config/weights")
     parser.add_argument("--epochs", type=int)
     parser.add_argument("--samples", type=int, dest="samples_per_epoch", help="crops an epoch")
     parser.add_argument("--batch", type=int)
-    parser.add_argument("--seed", type=int)
+    parser.add_argument("--seed", type=int, help="seed of the cards and the first weights")
     parser.add_argument("--pool", type=int, help="cards drawn ahead")
     parser.add_argument("--bfloat16", action="store_true", default=None,
                         help="multiply in half precision: twice as fast on processors made for it")

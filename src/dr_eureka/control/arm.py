@@ -34,6 +34,7 @@ class Arm:
         self.joints = arm_joint_names(hand)
         self._calibration = calibration or ArmCalibration(hand)
         self.chain = self._calibration.chain()
+        self._offsets = np.array(self._calibration.joint_offsets)
         self._solver = HybridSolver(self.chain, network, settings)
 
     def posture(self, left_posture: Sequence[float]) -> np.ndarray:
@@ -47,7 +48,7 @@ class Arm:
 
     def as_drawn(self, angles: np.ndarray) -> np.ndarray:
         """Return the angles (7,) at which an arm as drawn stands as this one does; lengths of links apart."""
-        return angles + np.array(self._calibration.joint_offsets)
+        return angles + self._offsets
 
     def stretches(self) -> dict[str, float]:
         """Return how much farther [m] each joint sits from the one before it (the first: from base) than drawn."""
@@ -61,20 +62,24 @@ class Arm:
         """Return base_from_end (4, 4) for this arm's joint angles (7,)."""
         return self._calibration.reached(self.chain.forward(angles))
 
-    def solve(self, start: np.ndarray, base_from_end: np.ndarray, code: str, what: str, rest: np.ndarray | None = None) -> np.ndarray:
+    def solve(
+        self, start: np.ndarray, base_from_end: np.ndarray, code: str, what: str, rest: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return joint angles (7,) for a hand pose; raise ControlError with `code`, naming `what` could not be reached."""
         result = self._solver.solve(start, self._calibration.commanded(base_from_end), rest=rest)
         return self._checked(result, base_from_end, code, what)
 
-    def path(self, start: np.ndarray, poses: Sequence[np.ndarray], code: str, what: str, rest: np.ndarray | None = None) -> np.ndarray:
+    def path(
+        self, start: np.ndarray, poses: Sequence[np.ndarray], code: str, what: str, rest: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return joint angles (k, 7) through neighbouring hand poses, without jumps; raises as `solve`."""
         results = self._solver.solve_path(start, [self._calibration.commanded(pose) for pose in poses], rest=rest)
         return np.array([self._checked(result, pose, code, what) for result, pose in zip(results, poses)])
 
     def _checked(self, result: IkResult, base_from_end: np.ndarray, code: str, what: str) -> np.ndarray:
         if result.code != IkCode.CONVERGED:
-            place = np.round(base_from_end[:3, 3], 3).tolist()
-            raise ControlError(code, f"{self.hand} hand cannot reach {what}, end link at {place} m in base: {result.code}, {result.reason}")
+            place = f"end link at {np.round(base_from_end[:3, 3], 3).tolist()} m in base"
+            raise ControlError(code, f"{self.hand} hand cannot reach {what}, {place}: {result.code}, {result.reason}")
         return result.joints
 
     def move(self, start: np.ndarray, end: np.ndarray, limits: MotionLimits, at_least: float = 0.0) -> JointTrajectory:
@@ -92,10 +97,10 @@ class Arm:
         rest: np.ndarray | None = None,
         hand_speed: float = np.inf,
     ) -> JointTrajectory:
-        """Return a trajectory on which the hand moves straight, at most at `hand_speed` [m/s], and turns evenly to a pose (4, 4).
+        """Return a trajectory on which the hand goes straight and turns evenly to a pose (4, 4); raises as `solve`.
 
-        Poses are solved every `spacing` [m] of the way. At a constant height the hand passes over standing tubes, which a straight
-        line in joint space does not promise.
+        The hand goes at most at `hand_speed` [m/s]. Poses are solved every `spacing` [m] of the way. At a constant height the
+        hand passes over standing tubes, which a straight line in joint space does not promise.
         """
         begin = self.forward(start)
         shift = end[:3, 3] - begin[:3, 3]
@@ -115,9 +120,16 @@ class Arm:
         return JointTrajectory.within(np.array(points), limits, share_speed)
 
     def line(
-        self, start: np.ndarray, translation: np.ndarray, spacing: float, hand_speed: float, limits: MotionLimits, code: str, what: str
+        self,
+        start: np.ndarray,
+        translation: np.ndarray,
+        spacing: float,
+        hand_speed: float,
+        limits: MotionLimits,
+        code: str,
+        what: str,
     ) -> JointTrajectory:
-        """Return a trajectory that moves the hand straight by a translation (3,) [m], orientation kept, at most at `hand_speed` [m/s]."""
+        """Return a trajectory that moves the hand straight by a translation (3,) [m], not turning it; else as `glide`."""
         end = self.forward(start)
         end[:3, 3] += translation
         return self.glide(start, end, spacing, limits, code, what, start, hand_speed)

@@ -12,7 +12,8 @@ from dr_eureka.control.motion import Follow, Motion, Wait
 def at_once(body: Body, first: Iterator[Motion], second: Iterator[Motion]) -> Iterator[Motion]:
     """Run two skills of different hands, each motion of one together with that of the other.
 
-    Where both together would collide, or one has no motion left, they go on one after the other, first the one whose way is free.
+    Where both together would collide, or one has no motion left, they go on one after the other, first the one whose way is
+    free.
     """
     skills = [first, second]
     motions = [next(skill, None) for skill in skills]

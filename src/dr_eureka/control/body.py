@@ -50,7 +50,11 @@ class Body:
 
     @classmethod
     def build(
-        cls, settings: ControlSettings, pieces: Pieces, network: ArmNetwork | None, calibrations: Mapping[str, ArmCalibration]
+        cls,
+        settings: ControlSettings,
+        pieces: Pieces,
+        network: ArmNetwork | None,
+        calibrations: Mapping[str, ArmCalibration],
     ) -> Body:
         """Make the body with its two arms; one without a calibration is as drawn."""
         arms = {hand: Arm(hand, settings.kinematics, network, calibrations.get(hand)) for hand in HANDS}
@@ -72,7 +76,8 @@ class Body:
     def place_of(self, tube: str) -> np.ndarray:
         """Return where a tube stands, foot (3,) [m] in base; raise ControlError if it is not known to stand anywhere."""
         if tube not in self.places:
-            raise ControlError(EngineCode.INVALID_ACTION, f"tube {tube!r} is not known to stand on the sheet; standing: {sorted(self.places)}")
+            problem = f"tube {tube!r} is not known to stand on the sheet; standing: {sorted(self.places)}"
+            raise ControlError(EngineCode.INVALID_ACTION, problem)
         return self.places[tube]
 
     def held_poses(self) -> dict[str, np.ndarray]:
@@ -83,9 +88,8 @@ class Body:
         """Return the tube held in a hand; raise ControlError if that hand holds another or none."""
         held = self.held.get(hand)
         if held is None or held.tube != tube:
-            raise ControlError(
-                EngineCode.INVALID_ACTION, f"{hand} hand should hold tube {tube!r} but holds {held.tube if held else 'nothing'}"
-            )
+            holds = held.tube if held else "nothing"
+            raise ControlError(EngineCode.INVALID_ACTION, f"{hand} hand should hold tube {tube!r} but holds {holds}")
         return held
 
     def check_grip(self, hand: str, code: str, moment: str) -> None:
@@ -93,6 +97,5 @@ class Body:
         low, high = self.settings.grip.on_tube
         angle = self.joints[grip_joint(hand)]
         if not low <= angle <= high:
-            raise ControlError(
-                code, f"{hand} hand {moment}: fingers at {angle:.3f} rad, expected {low:.3f} to {high:.3f} with a tube between them"
-            )
+            expected = f"expected {low:.3f} to {high:.3f} with a tube between them"
+            raise ControlError(code, f"{hand} hand {moment}: fingers at {angle:.3f} rad, {expected}")

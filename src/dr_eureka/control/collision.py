@@ -28,6 +28,7 @@ from dr_eureka.resources import resource_path
 # The links that a held tube moves with; its contact with them is the grasp.
 _HAND_LINKS = ("arm_wr_p_link", "arm_grip_link", "arm_grip_1_link")
 _ARM_LINKS = ("arm_sh_p2_link", "arm_el_y_link", "arm_wr_r_link", "arm_wr_y_link", *_HAND_LINKS)
+_SHOULDER_LINKS = ("arm_sh_p1_link", "arm_sh_r_link")
 _TRUNK_LINKS = ("pelvis_link", "chest_link", "head_y_link", "head_p_link")
 # [m] how far from a joint a point beyond it may be, along the links and up to the end of a held tube: its way per radian.
 REACH = {
@@ -38,6 +39,10 @@ REACH = {
 _SAME_DISTANCE = 2e-4
 
 Pair = frozenset[str]
+# What holds the upper arm, in every posture.
+_SHOULDERS = {
+    frozenset((f"{hand[0]}_{link}", f"{hand[0]}_arm_sh_p2_link")) for hand in HANDS for link in _SHOULDER_LINKS
+}
 
 
 @dataclass(frozen=True)
@@ -84,12 +89,17 @@ def tube_body(tube: str) -> str:
     return f"tube {tube}"
 
 
+def _shoulder(hand: str) -> str:
+    """Name the part of the robot that holds the upper arm."""
+    return f"{hand} shoulder"
+
+
 class CollisionChecker:
     """Finds the first posture of a motion in which two bodies are nearer than the margin.
 
-    Checked are arm with arm, arms with trunk, head, furniture and standing tubes, and held tubes with all of these, the
-    other held tube and the arm that holds them beyond its hand. Not checked are neighbours that a joint connects, and an arm
-    with itself (its joint limits see to that).
+    Checked are arm with arm, arms with trunk, head, both shoulders, furniture and standing tubes, and held tubes with all of
+    these, the other held tube and the arm that holds them beyond its hand. Not checked are neighbours that a joint connects,
+    and an arm with itself from the upper arm on: its joint limits keep all but a few millimetres of these boxes apart.
     """
 
     def __init__(self, settings: CollisionSettings, pieces: Pieces, arms: Mapping[str, Arm]):
@@ -99,10 +109,10 @@ class CollisionChecker:
         self._names: dict[tuple[int, int], str] = {}
         self._joints: dict[str, dict[str, int]] = {}
         self._parts: dict[str, int] = {}
-        for part, links in (
-            ("trunk", _TRUNK_LINKS), *((hand, [f"{hand[0]}_{link}" for link in _ARM_LINKS]) for hand in HANDS)
-        ):
-            self._add_part(part, links)
+        self._add_part("trunk", _TRUNK_LINKS, None)
+        for hand in HANDS:
+            self._add_part(hand, [f"{hand[0]}_{link}" for link in _ARM_LINKS], arms[hand])
+            self._add_part(_shoulder(hand), [f"{hand[0]}_{link}" for link in _SHOULDER_LINKS], arms[hand])
         self._furniture = [self._add_box(name, box.centre, box.size) for name, box in settings.furniture.items()]
         self._tubes = {tube: self._add_tube(tube_body(tube), pieces) for tube in TUBES}
         for body in (*self._furniture, *self._tubes.values()):
@@ -110,10 +120,10 @@ class CollisionChecker:
             # robot's links by 0.7 mm each, which cannot be changed.
             pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
 
-    def _add_part(self, part: str, links: Iterable[str]) -> None:
+    def _add_part(self, part: str, links: Iterable[str], arm: Arm | None) -> None:
         """Load some links of the robot, and what they hang from, as one body: Bullet compares all links of two bodies."""
         with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
-            file.write(_only(set(links), resource_path(URDF).read_text(encoding="utf-8"), self._arms.get(part)))
+            file.write(_only(set(links), resource_path(URDF).read_text(encoding="utf-8"), arm))
             file.flush()
             body = pybullet.loadURDF(file.name, useFixedBase=True, physicsClientId=self._client)
         joints = {}
@@ -174,14 +184,14 @@ class CollisionChecker:
             now = {**joints, **{name: values[index] for name, values in moving.items()}}
             self._place(now, tubes, self._parts if index == 0 else moved)
             nearest = self._settings.horizon
-            for bodies, distance, where in self._distances(pairs, tubes):
+            for bodies, distance, ends in self._distances(pairs, tubes):
                 pair = frozenset(bodies)
                 if pair in allowed:
                     continue
                 if index == 0:
                     limits[pair] = min(limits.get(pair, margin), distance - _SAME_DISTANCE)
                 elif distance < limits.get(pair, margin):
-                    return Hit(bodies, distance, limits.get(pair, margin), where, float(times[index]))
+                    return Hit(bodies, distance, limits.get(pair, margin), np.mean(ends, axis=0), float(times[index]))
                 nearest = min(nearest, distance)
             if index == last:
                 return None
@@ -190,9 +200,7 @@ class CollisionChecker:
 
     def _moved_by(self, moving: Mapping[str, np.ndarray]) -> set[str]:
         """Return the parts of the robot that a motion of these joints moves."""
-        if "torso_y" in moving:
-            return set(self._parts)
-        return {"left" if name.startswith("l_") else "right" if name.startswith("r_") else "trunk" for name in moving}
+        return {part for part, joints in self._joints.items() if joints.keys() & moving.keys()}
 
     def _pairs(self, moved: set[str], tubes: Tubes) -> Iterator[tuple[int, int]]:
         """Yield the pairs of bodies whose distance a motion of these parts changes."""
@@ -206,10 +214,12 @@ class CollisionChecker:
             if hand in moved:
                 yield from ((body, thing) for body in (self._parts[hand], *carried) for thing in fixed)
                 yield from ((tube, self._parts[hand]) for tube in carried)
+                yield from ((body, self._parts[_shoulder(hand)]) for body in (self._parts[hand], *carried))
             if hand in moved or "trunk" in moved:
                 yield from ((body, self._parts["trunk"]) for body in (self._parts[hand], *carried))
             if moved & set(HANDS):
                 yield from ((tube, self._parts[other]) for tube in carried)
+                yield from ((body, self._parts[_shoulder(other)]) for body in (self._parts[hand], *carried))
 
     def _place_standing(self, tubes: Tubes) -> None:
         for tube, foot in tubes.standing.items():
@@ -236,15 +246,15 @@ class CollisionChecker:
 
     def _distances(
         self, pairs: Sequence[tuple[int, int]], tubes: Tubes
-    ) -> Iterator[tuple[tuple[str, str], float, np.ndarray]]:
-        """Yield names, distance [m] and a point between them (3,) [m] for all bodies that are nearer than the horizon."""
+    ) -> Iterator[tuple[tuple[str, str], float, tuple[Sequence[float], Sequence[float]]]]:
+        """Yield names, distance [m] and nearest points (x, y, z) [m] of all two bodies that are nearer than the horizon."""
         held = tubes.held.items()
-        grasps = {frozenset((tube_body(tube), link)) for hand, (tube, _) in held for link in hand_links(hand)}
+        together = _SHOULDERS | {frozenset((tube_body(tube), link)) for hand, (tube, _) in held for link in hand_links(hand)}
         for first, second in pairs:
             for point in pybullet.getClosestPoints(first, second, self._settings.horizon, physicsClientId=self._client):
                 names = self._names[first, point[3]], self._names[second, point[4]]
-                if frozenset(names) not in grasps:
-                    yield names, point[8], 0.5 * (np.array(point[5]) + np.array(point[6]))
+                if frozenset(names) not in together:
+                    yield names, point[8], (point[5], point[6])
 
 
 def _only(links: set[str], urdf: str, arm: Arm | None) -> str:
@@ -267,11 +277,14 @@ def _only(links: set[str], urdf: str, arm: Arm | None) -> str:
         if name not in kept:
             robot.remove(link)
             robot.remove(above[name])
-    for name, stretch in arm.stretches().items() if arm else ():
-        origin = robot.find(f"joint[@name='{name}']/origin")
-        place = np.array([float(word) for word in origin.get("xyz").split()])
-        away = arm.chain.first_joint_origin if name == arm.joints[0] else place
-        origin.set("xyz", " ".join(map(str, place + stretch * away / np.linalg.norm(away))))
+    stretches = arm.stretches() if arm else {}
+    for joint in robot.findall("joint"):
+        if stretches.get(joint.get("name")):
+            origin = joint.find("origin")
+            place = np.array([float(word) for word in origin.get("xyz").split()])
+            away = arm.chain.first_joint_origin if joint.get("name") == arm.joints[0] else place
+            stretched = place + stretches[joint.get("name")] * away / np.linalg.norm(away)
+            origin.set("xyz", " ".join(map(str, stretched)))
     return ElementTree.tostring(robot, encoding="unicode")
 
 

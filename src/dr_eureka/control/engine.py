@@ -13,7 +13,7 @@ import numpy as np
 from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.body import Body
 from dr_eureka.control.codes import POUR_METHODS, ControlError, EngineCode, EngineState
-from dr_eureka.control.limits import CommandLimiter, JointLimit
+from dr_eureka.control.limits import CommandLimiter, JointLimit, joint_ranges
 from dr_eureka.control.motion import Brake, Follow, Motion
 from dr_eureka.control.port import CONTROLLED_JOINTS, grip_joint
 from dr_eureka.control.settings import ControlSettings
@@ -25,9 +25,7 @@ from dr_eureka.game.state import TUBES
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.pieces import Pieces
 
-HEAD_AND_TORSO_RANGES = {"head_y": (-1.5708, 1.5708), "head_p": (-1.0472, 1.5184), "torso_y": (-1.5708, 1.5708)}
-GRIP_RANGE = (0.0, 1.15)
-
+_ROUNDED = 1e-4  # [rad] a limit that is given with four decimals is that limit
 
 @dataclass(frozen=True)
 class EngineStatus:
@@ -64,7 +62,7 @@ class ControlEngine:
     ):
         self.body = Body.build(settings, pieces, network, calibrations)
         self.settings = settings
-        self.ranges = self._ranges()
+        self.ranges = joint_ranges()
         self._limiter = CommandLimiter(
             {name: JointLimit(low, high, settings.speeds.hardware) for name, (low, high) in self.ranges.items()},
             settings.speeds.longest_step,
@@ -81,12 +79,6 @@ class ControlEngine:
         self.durations: list[tuple[int, float, float]] = []
         """(action index, start, end) [s] of every finished action of the strategy."""
 
-    def _ranges(self) -> dict[str, tuple[float, float]]:
-        ranges = {grip_joint(hand): GRIP_RANGE for hand in HANDS} | HEAD_AND_TORSO_RANGES
-        for arm in self.body.arms.values():
-            ranges |= {name: (float(low), float(high)) for name, low, high in zip(arm.joints, arm.chain.lower, arm.chain.upper)}
-        return ranges
-
     def start(
         self,
         actions: Sequence[Action],
@@ -100,21 +92,23 @@ class ControlEngine:
 
         Tubes stand with their feet at `places` (3,) [m] in base and hold that many `balls` each; `method` is one of
         POUR_METHODS. With `pause_after_pours` it waits for `go_on` after each pour but the last. With `hands_at_once`,
-        neighbouring picks and places of different hands are carried out together, as far as neither hand is in the other's way.
+        neighbouring picks and places of different hands are carried out together, as far as neither is in the other's way.
         """
         self._refuse_when_busy()
         if method not in POUR_METHODS:
-            raise ControlError(EngineCode.INVALID_ACTION, f"pour method {method!r}, expected one of {', '.join(POUR_METHODS)}")
+            known = ", ".join(POUR_METHODS)
+            raise ControlError(EngineCode.INVALID_ACTION, f"pour method {method!r}, expected one of {known}")
         for tube, foot in places.items():
             if tube not in TUBES:
                 raise ControlError(EngineCode.INVALID_VALUE, f"tube {tube!r}, expected some of {', '.join(TUBES)}")
             if len(foot) != 3 or not all(isfinite(value) for value in foot):
-                raise ControlError(EngineCode.INVALID_VALUE, f"place of tube {tube!r} is {list(foot)}, expected three finite metres")
+                problem = f"place of tube {tube!r} is {list(foot)}, expected three finite metres"
+                raise ControlError(EngineCode.INVALID_VALUE, problem)
         check_actions(actions, places)
         self._check_hands_are_empty()
-        torso = self.body.joints.get("torso_y", 0.0)
-        if abs(torso) > self.settings.guards.torso:
-            raise ControlError(EngineCode.OUT_OF_LIMITS, f"torso_y is at {torso:.3f} rad, expected at most {self.settings.guards.torso} from 0")
+        torso, most = self.body.joints.get("torso_y", 0.0), self.settings.guards.torso
+        if abs(torso) > most:
+            raise ControlError(EngineCode.OUT_OF_LIMITS, f"torso_y is at {torso:.3f} rad, expected at most {most} from 0")
         self.body.places = {tube: np.array(foot, dtype=float) for tube, foot in places.items()}
         self._begin(strategy(self.body, actions, balls, method, pause_after_pours, hands_at_once))
 
@@ -126,24 +120,24 @@ class ControlEngine:
             if hand in self.body.held and angle < low:
                 # Opened by request since: whatever was held is no longer.
                 del self.body.held[hand]
-                self.body.pour_ready = None
+                self.body.pour_ready, self.body.upright = None, {}
             if hand in self.body.held or low <= angle <= high:
-                raise ControlError(
-                    EngineCode.INVALID_ACTION,
-                    f"a strategy starts with empty hands, {hand} fingers are at {angle:.3f} rad, as on a tube; open them first",
-                )
+                fingers = f"{hand} fingers are at {angle:.3f} rad, as on a tube; open them first"
+                raise ControlError(EngineCode.INVALID_ACTION, f"a strategy starts with empty hands, {fingers}")
 
     def move_joints(self, goals: Mapping[str, float], duration: float) -> None:
-        """Move named joints to positions [rad] in `duration` seconds (0: as quickly as the limits allow). Raises ControlError."""
+        """Move named joints to positions [rad] in `duration` [s], 0: as quickly as the limits allow; raise ControlError."""
         if not goals or not isfinite(duration) or duration < 0.0:
-            raise ControlError(EngineCode.INVALID_VALUE, f"{len(goals)} joints in {duration} s, expected at least one and a finite time")
+            problem = f"{len(goals)} joints in {duration} s, expected at least one and a finite time"
+            raise ControlError(EngineCode.INVALID_VALUE, problem)
         for name, goal in goals.items():
             if name not in self.ranges:
-                raise ControlError(EngineCode.UNKNOWN_JOINT, f"joint {name!r}, expected one of {', '.join(sorted(self.ranges))}")
+                known = ", ".join(sorted(self.ranges))
+                raise ControlError(EngineCode.UNKNOWN_JOINT, f"joint {name!r}, expected one of {known}")
             if not isfinite(goal):
                 raise ControlError(EngineCode.INVALID_VALUE, f"{name} to {goal} rad, expected a finite angle")
             low, high = self.ranges[name]
-            if not low - 1e-6 <= goal <= high + 1e-6:
+            if not low - _ROUNDED <= goal <= high + _ROUNDED:
                 raise ControlError(EngineCode.OUT_OF_LIMITS, f"{name} to {goal:.3f} rad, expected {low:.3f} to {high:.3f}")
         self._refuse_when_busy()
         if not self.body.goals:
@@ -151,27 +145,27 @@ class ControlEngine:
         self._begin(Script(f"moving {', '.join(goals)}", self._joint_move(dict(goals), duration)))
 
     def go_on(self, put_down: bool) -> None:
-        """End a pause: carry the strategy on, or leave it and put down what is held. Raises ControlError (INVALID_ACTION)."""
+        """End a pause: carry the strategy on, or leave it and put down what is held; raise ControlError (INVALID_ACTION)."""
         if not self.status.paused:
             raise ControlError(EngineCode.INVALID_ACTION, f"no pour waits to be looked at: {self.status.message}")
         self._script.paused, self._script.put_down = False, put_down
         self.status = replace(self.status, paused=False)
 
     def stop(self) -> None:
-        """Leave what is under way: from the next cycle on the joints brake on their path, then hold; hands keep their tubes."""
+        """Leave what is under way: from the next cycle on joints brake on their path, then hold; hands keep their tubes."""
         self._halt()
         self.status = replace(
             self.status, state=EngineState.IDLE, code=EngineCode.STOPPED, message="stopped on request", paused=False
         )
 
     def lose(self, message: str) -> None:
-        """Note that joint states no longer arrive; the robot holds. When they come back, holding starts from what they say."""
+        """Note that joint states no longer arrive; the robot holds. When they are back, it holds what they say."""
         self._fail(EngineCode.JOINT_STATES_LOST, message)
         self._motion = None
         self.body.goals = {}
 
     def tick(self, time_s: float, joints: Mapping[str, float]) -> dict[str, float]:
-        """Return this cycle's joint goals [rad] given the time [s] and the measured joints [rad]; never NaN, never outside limits."""
+        """Return this cycle's joint goals [rad], finite and inside limits, given the time [s] and measured joints [rad]."""
         missing = [name for name in CONTROLLED_JOINTS if name not in joints]
         if missing or not all(isfinite(joints[name]) for name in CONTROLLED_JOINTS):
             bad = missing or [name for name in CONTROLLED_JOINTS if not isfinite(joints[name])]
@@ -277,7 +271,9 @@ class ControlEngine:
             error = abs(self.body.goals[name] - self.body.joints[name])
             if error <= guards.tracking_error:
                 self._lagging_since.pop(name, None)
-            elif time_s - self._lagging_since.setdefault(name, time_s) > guards.tracking_seconds and self._script is not None:
+                continue
+            lagging = time_s - self._lagging_since.setdefault(name, time_s)
+            if lagging > guards.tracking_seconds and self._script is not None:
                 raise ControlError(EngineCode.TRACKING_ERROR, f"{name} is {error:.3f} rad from its goal")
 
     def _fail(self, code: str, message: str) -> None:

@@ -1,7 +1,8 @@
 """Where a hand must be for a tube to be somewhere, and the other way round.
 
-A tube's frame has its origin at the centre of the foot's underside and z along the axis to the mouth; x is the hand's approach
-direction made perpendicular to the axis. A hand's frame is the arm's end link (x approach, y finger opening, z pad width).
+A tube's frame has its origin at the centre of the foot's underside and z along the axis to the mouth; x is the hand's
+approach direction made perpendicular to the axis. A hand's frame is the arm's end link (x approach, y finger opening, z pad
+width).
 """
 
 from __future__ import annotations
@@ -22,16 +23,19 @@ def frame_along(axis: np.ndarray, approach: np.ndarray, origin: np.ndarray) -> n
 
 
 def level_hand(grasp_centre: np.ndarray, yaw: float, centre_beyond_end: float) -> np.ndarray:
-    """Return base_from_end (4, 4) of a level hand whose grasp centre is at a point (3,) [m], approaching along `yaw` [rad]."""
+    """Return base_from_end (4, 4) of a level hand with its grasp centre at a point (3,) [m], approaching along `yaw` [rad].
+
+    `centre_beyond_end` [m]: how far the grasp centre is in front of the end link.
+    """
     approach = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     return frame_along(UP, approach, np.asarray(grasp_centre) - centre_beyond_end * approach)
 
 
 def tube_in_hand(base_from_end: np.ndarray, foot: np.ndarray) -> np.ndarray:
-    """Return end_from_tube (4, 4) at the moment the fingers have closed on an upright tube whose foot is at (3,) [m] in base.
+    """Return end_from_tube (4, 4) when the fingers have closed on an upright tube whose foot is at (3,) [m] in base.
 
-    The fingers are coupled, so they slide the tube to the middle between them: along y the tube is where the hand is, not where
-    it was seen.
+    The fingers are coupled, so they slide the tube to the middle between them: along y the tube is where the hand is, not
+    where it was seen.
     """
     end_from_base = invert(base_from_end)
     axis = end_from_base[:3, :3] @ UP

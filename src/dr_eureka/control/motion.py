@@ -11,6 +11,8 @@ from dr_eureka.control.trajectory import JointTrajectory, SampledTrajectory, Tra
 
 Trajectory = JointTrajectory | SampledTrajectory | TrajectorySequence
 Track = tuple[tuple[str, ...], Trajectory]
+# Asked each cycle with the seconds since the motion began and the measured joints [rad].
+Condition = Callable[[float, Mapping[str, float]], bool]
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Wait:
     Running out of time is not an error here: the skill that waited looks at the joints and decides.
     """
 
-    until: Callable[[float, Mapping[str, float]], bool]
+    until: Condition
     limit: float
 
     def goals(self, elapsed: float) -> dict[str, float]:
@@ -94,7 +96,7 @@ class Wait:
 Motion = Follow | Wait
 
 
-def settled(names: tuple[str, ...], quiet: float = 0.002, seconds: float = 0.08) -> Callable[[float, Mapping[str, float]], bool]:
+def settled(names: tuple[str, ...], quiet: float = 0.002, seconds: float = 0.08) -> Condition:
     """Return a condition that holds once the joints have moved less than `quiet` [rad] for `seconds`."""
     reference: dict[str, float] = {}
     since = [0.0]

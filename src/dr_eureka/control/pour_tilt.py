@@ -61,7 +61,10 @@ def _impossible(method: str, balls_before: int, count: int) -> ControlError:
 
 
 def _followed(command: Callable[[float], float], start: float, limits: TiltLimits, turn: float) -> Tilt:
-    """Return how a tilt at rest at `start` [rad] follows a command within limits; it ends at the goal that holds from `turn` [s] on."""
+    """Return how a tilt at rest at `start` [rad] follows a command, time [s] -> elevation [rad], within limits.
+
+    It ends at the goal that holds from `turn` [s] on.
+    """
     times, elevations, rate, goal = [0.0], [start], 0.0, command(turn)
     while times[-1] <= turn or abs(goal - elevations[-1]) > _ARRIVED:
         gap = command(times[-1]) - elevations[-1]

@@ -16,7 +16,10 @@ _LOW_M = 0.05  # a hand that is no more than this above where it grasps a standi
 
 
 def put_all_down(body: Body, homes: Mapping[str, np.ndarray]) -> Iterator[Motion]:
-    """Let go of what is not safely held, place what is at `homes`, feet (3,) [m] in base, and go home; raises ControlError."""
+    """Let go of what is not safely held, place what is at `homes`, feet (3,) [m] in base, and go home.
+
+    Raises ControlError when a hand cannot get there, or loses its tube on the way.
+    """
     low, high = body.settings.grip.on_tube
     for hand in tuple(body.held):
         if not low <= body.joints[grip_joint(hand)] <= high:

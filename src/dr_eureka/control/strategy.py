@@ -16,6 +16,7 @@ from dr_eureka.control.pouring import pour, raise_tubes
 from dr_eureka.control.recovery import put_all_down
 from dr_eureka.game.actions import Action
 from dr_eureka.game.hands import HANDS
+from dr_eureka.game.state import TUBE_CAPACITY
 
 _KINDS = ("pick", "place", "pour")
 
@@ -54,10 +55,24 @@ def check_actions(actions: Sequence[Action], places: Mapping[str, Sequence[float
                 )
 
 
+def _check_counts(actions: Sequence[Action], balls: Mapping[str, int]) -> None:
+    """Raise ControlError for a pour of more balls than its tube will hold by then, or than the other one has room for."""
+    held = dict(balls)
+    for index, action in enumerate(actions):
+        if action.kind != "pour":
+            continue
+        there, room = held.get(action.tube, 0), TUBE_CAPACITY - held.get(action.target_tube, 0)
+        if not 1 <= action.count <= min(there, room):
+            problem = f"the tube will hold {there} balls by then, the other one have room for {room}"
+            raise ControlError(EngineCode.INVALID_ACTION, f"action {index} ({action}): {problem}")
+        held[action.tube], held[action.target_tube] = there - action.count, TUBE_CAPACITY - room + action.count
+
+
 def strategy(
     body: Body, actions: Sequence[Action], balls: Mapping[str, int], method: str, pauses: bool, hands_at_once: bool
 ) -> Script:
     """Return the script that carries actions out; see `ControlEngine.start`."""
+    _check_counts(actions, balls)
     script = Script("strategy accepted")
     homes = dict(body.places)
     motions = _motions(script, body, homes, tuple(actions), dict(balls), method, pauses, hands_at_once)
@@ -133,9 +148,6 @@ def _of_both_hands(actions: Sequence[Action]) -> bool:
 def _pour(body: Body, action: Action, balls: dict[str, int], method: str) -> Iterator[Motion]:
     body.held_in(action.hand, action.tube)
     body.held_in(action.target_hand, action.target_tube)
-    held = balls.get(action.tube, 0)
-    if not 1 <= action.count <= held:
-        raise ControlError(EngineCode.INVALID_ACTION, f"{action}: the tube holds {held} balls as far as is known")
-    yield from pour(body, action.hand, action.target_hand, method, held, action.count)
+    yield from pour(body, action.hand, action.target_hand, method, balls[action.tube], action.count)
     balls[action.tube] -= action.count
     balls[action.target_tube] = balls.get(action.target_tube, 0) + action.count

@@ -23,10 +23,14 @@ class PlannerError(DrEurekaError):
 
 @dataclass(frozen=True)
 class Measured:
-    """A mean duration [s] and how many times it was measured; 0 for an estimate."""
+    """A mean duration [s] and how many times it was measured; 0 for an estimate.
+
+    `failed`: how many picks or places besides were ended by a fault. Plans do not count on that: the robot looks and tries again.
+    """
 
     seconds: float = field(metadata={"min": 0.0, "max": 600.0})
     trials: int = field(default=0, metadata={"min": 0})
+    failed: int = field(default=0, metadata={"min": 0})
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Mapping, Sequence
+from typing import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -125,8 +125,9 @@ class Chain:
         angles = self._checked(joints)
         if angles.ndim == 1:
             return self._joint_frames(angles)[-1] @ self._tip
-        rotations, origins = self._joint_frames_of_batch(angles.reshape(-1, len(self)))
-        return _stack(*self._tip_of_batch(rotations, origins)).reshape(angles.shape[:-1] + (4, 4))
+        for frames in self._frames_of_batch(angles.reshape(-1, len(self))):
+            pass  # only the last one matters here, and keeping the others in memory takes longer than making them
+        return _stack(*self._tip_of_batch(*frames)).reshape(angles.shape[:-1] + (4, 4))
 
     def forward_all(self, joints: np.ndarray) -> dict[str, np.ndarray]:
         """Return root_from_link (4, 4) of every link between root and tip, by name, for joints (n,) [rad]."""
@@ -149,10 +150,11 @@ class Chain:
             axes = (frames[:, :3, :3] @ self._axis_columns)[:, :, 0].T
             return root_from_tip, _jacobian(axes, (root_from_tip[:3, 3] - frames[:, :3, 3]).T)
         shape = angles.shape[:-1]
-        rotations, origins = self._joint_frames_of_batch(angles.reshape(-1, len(self)))
-        rotation, position = self._tip_of_batch(rotations, origins)
-        axes = np.einsum("kijn,kj->ikn", rotations, self._axes)
-        jacobians = _jacobian(axes, (position - origins).transpose(1, 0, 2))
+        axes, origins = np.empty((2, 3, len(self), angles.size // len(self)))
+        for index, (rotation, origin) in enumerate(self._frames_of_batch(angles.reshape(-1, len(self)))):
+            axes[:, index], origins[:, index] = np.einsum("ijn,j->in", rotation, self._axes[index]), origin
+        rotation, position = self._tip_of_batch(rotation, origin)
+        jacobians = _jacobian(axes, position[:, None] - origins)
         poses = _stack(rotation, position).reshape(shape + (4, 4))
         return poses, jacobians.transpose(2, 0, 1).reshape(shape + (6, len(self)))
 
@@ -177,29 +179,24 @@ class Chain:
             np.matmul(frames[index - 1], frames[index].copy(), out=frames[index])
         return frames
 
-    def _joint_frames_of_batch(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rotations (n, 3, 3, batch) and origins (n, 3, batch) of root_from_joint for angles (batch, n).
+    def _frames_of_batch(self, angles: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield rotation (3, 3, batch) and origin (3, batch) of root_from_joint for angles (batch, n), joint by joint.
 
         The batch is the last axis, where numpy runs along memory: some twenty times faster than products of (batch, 4, 4).
         """
-        sines, cosines = np.sin(angles.T), np.cos(angles.T)
-        rotations = np.empty((len(self), 3, 3, len(angles)))
-        origins = np.empty((len(self), 3, len(angles)))
-        parts = (self._constant[:, :3, :3, None], self._sine[:, :3, :3, None], self._cosine[:, :3, :3, None])
-        for index, (constant, sine, cosine) in enumerate(zip(*parts)):
-            local = constant + sine * sines[index] + cosine * cosines[index]
-            offset = self._constant[index, :3, 3]
-            if index == 0:
-                rotations[index], origins[index] = local, offset[:, None]
-            else:
-                np.einsum("ijn,jkn->ikn", rotations[index - 1], local, out=rotations[index])
-                origins[index] = origins[index - 1] + np.einsum("ijn,j->in", rotations[index - 1], offset)
-        return rotations, origins
+        rotation, origin = np.eye(3)[:, :, None], np.zeros((3, 1))
+        for index, (sine, cosine) in enumerate(zip(np.sin(angles.T), np.cos(angles.T))):
+            constant, along_sine, along_cosine = (
+                part[index, :3, :3, None] for part in (self._constant, self._sine, self._cosine)
+            )
+            origin = origin + np.einsum("ijn,j->in", rotation, self._constant[index, :3, 3])
+            rotation = np.einsum("ijn,jkn->ikn", rotation, constant + along_sine * sine + along_cosine * cosine)
+            yield rotation, origin
 
-    def _tip_of_batch(self, rotations: np.ndarray, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rotation (3, 3, batch) and position (3, batch) of root_from_tip."""
-        rotation = np.einsum("ijn,jk->ikn", rotations[-1], self._tip[:3, :3])
-        return rotation, origins[-1] + np.einsum("ijn,j->in", rotations[-1], self._tip[:3, 3])
+    def _tip_of_batch(self, rotation: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rotation (3, 3, batch) and position (3, batch) of root_from_tip, given those of the last joint."""
+        position = origin + np.einsum("ijn,j->in", rotation, self._tip[:3, 3])
+        return np.einsum("ijn,jk->ikn", rotation, self._tip[:3, :3]), position
 
 
 def _jacobian(axes: np.ndarray, levers: np.ndarray) -> np.ndarray:

@@ -27,6 +27,7 @@ _RESTART_SEED = 2020  # restarts are drawn afresh, but alike, in each solve: equ
 _FADE_DISTANCE = 0.05  # [m] nearer than this the pull to the rest posture fades, so that it cannot delay the last millimetre
 _SETTLED = 1e-3  # [rad] a posture that moves less than this in a step has settled
 _CYCLES_UNASKED = 6  # after a refused step: what misled the network here will do so a little farther on
+_BELOW = np.array([0.0, 0.0, 0.0, 1.0])  # last row of a homogeneous transform
 _PROGRESS = 0.98  # an error below this share of the best one so far counts as progress
 
 
@@ -148,9 +149,8 @@ class HybridSolver:
             return refuse(IkCode.INVALID_TARGET, "target or start is not an array of numbers")
         if pose.shape != (4, 4) or not np.all(np.isfinite(pose)):
             return refuse(IkCode.INVALID_TARGET, f"target of shape {pose.shape} is not a finite 4x4 transform")
-        rotation = pose[:3, :3]
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0.0:
-            return refuse(IkCode.INVALID_TARGET, "target's rotation part is not a rotation matrix")
+        if not _is_rigid(pose):
+            return refuse(IkCode.INVALID_TARGET, "target is no rigid transform: a rotation, a place, and 0 0 0 1 below")
         if start.shape != (len(self._chain),) or not np.all(np.isfinite(start)):
             count = len(self._chain)
             return refuse(IkCode.INVALID_TARGET, f"start of shape {start.shape} is not {count} finite joint angles")
@@ -260,3 +260,10 @@ class HybridSolver:
         """Tell whether the limits are what keeps the arm from the target."""
         return self._attempt(joints, target, self._mid_range, deadline, limited=False).converged
 
+
+def _is_rigid(pose: np.ndarray) -> bool:
+    """Tell whether a finite (4, 4) is a rotation and a translation, to a thousandth."""
+    rotation = pose[:3, :3]
+    if np.abs(rotation).max() > 2.0 or np.abs(pose[3] - _BELOW).max() > 1e-9:  # before products that might overflow
+        return False
+    return bool(np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-3 and np.linalg.det(rotation) > 0.0)

@@ -1,4 +1,4 @@
-"""One step of the damped Jacobian (paper 3.4) inside the joint limits, with what spare freedom the arm has put to use."""
+"""Steps of the damped Jacobian (paper 3.4): one inside the joint limits, spare freedom put to use, or many plain ones."""
 
 from __future__ import annotations
 
@@ -72,3 +72,27 @@ class JacobianStep:
     def _inverse(self, jacobian: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """Return J^T (J J^T + lambda^2 I)^-1 twist."""
         return jacobian.T @ dposv(jacobian @ jacobian.T + self._damping, twist)[1]
+
+
+def damped_steps(jacobians: np.ndarray, twists: np.ndarray, damping_squared: float | np.ndarray) -> np.ndarray:
+    """Return J^T (J J^T + lambda^2 I)^-1 twist (n, k) [rad] of Jacobians (n, r, k) and twists (n, r) [m, rad], all at once.
+
+    damping_squared: lambda^2, one for all or (n,). By Cholesky's method with the batch as the last axis, along which numpy
+    runs: LAPACK takes such small matrices one by one, four times as slowly.
+    """
+    rows, left = np.ascontiguousarray(jacobians.transpose(1, 2, 0)), twists.T.copy()
+    count = len(rows)
+    factor = np.empty((count, count, len(twists)))
+    for row in range(count):
+        factor[row:, row] = np.einsum("ikn,kn->in", rows[row:], rows[row])
+        factor[row, row] += damping_squared
+    for row in range(count):
+        factor[row:, row] /= np.sqrt(factor[row, row])
+        left[row] /= factor[row, row]
+        left[row + 1 :] -= factor[row + 1 :, row] * left[row]
+        for below in range(row + 1, count):
+            factor[below:, below] -= factor[below:, row] * factor[below, row]
+    for row in reversed(range(count)):
+        left[row] /= factor[row, row]
+        left[:row] -= factor[row, :row] * left[row]
+    return np.einsum("ikn,in->nk", rows, left)

@@ -28,7 +28,7 @@ class ArmNetwork:
     """Joint increments of the left arm for a step of its end link; the right arm is served through the mirror."""
 
     def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
-        """Fold the batch norm of `weights` (keys as `training.export` writes them) into the dense layers.
+        """Fold the batch norm of `weights` (keys as `torch_network.weights_of` gives them) into the dense layers.
 
         Raises ArmNetworkError for a missing array or one of the wrong shape.
         """

@@ -8,12 +8,17 @@ of the samples are steps straight through space, as the hybrid asks for them; ra
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from dr_eureka.kinematics.chain import Chain
+from dr_eureka.kinematics.jacobian_step import damped_steps
 from dr_eureka.kinematics.transforms import rotation_vectors, rotations_from_vectors
+
+# Joints (n, 7) [rad], hand steps (n, 6) [m, rad] and target poses (n, 4, 4), drawn within settings.
+Draw = Callable[[Chain, np.random.Generator, "SampleSettings"], tuple[np.ndarray, ...]]
 
 _NEWTON_STEPS = 8
 _NEWTON_DAMPING = 1e-6
@@ -108,11 +113,8 @@ def least_norm_change(chain: Chain, joints: np.ndarray, targets: np.ndarray) -> 
     moving = np.arange(len(joints))
     for _ in range(_NEWTON_STEPS):
         poses, jacobians = chain.forward_and_jacobian(joints[moving] + change[moving])
-        jacobians = np.ascontiguousarray(jacobians)
         wanted = pose_errors(poses, targets[moving]) + np.einsum("nij,nj->ni", jacobians, change[moving])
-        squares = jacobians @ jacobians.transpose(0, 2, 1) + _NEWTON_DAMPING * np.eye(6)
-        found = np.einsum("nij,ni->nj", jacobians, np.linalg.solve(squares, wanted[..., None])[..., 0])
-        found = np.clip(found, -_LARGEST_CHANGE, _LARGEST_CHANGE)
+        found = np.clip(damped_steps(jacobians, wanted, _NEWTON_DAMPING), -_LARGEST_CHANGE, _LARGEST_CHANGE)
         restless = np.abs(found - change[moving]).max(axis=1) > _SETTLED
         change[moving] = found
         moving = moving[restless]
@@ -136,7 +138,9 @@ def moved(poses: np.ndarray, delta: np.ndarray) -> np.ndarray:
     return result
 
 
-def _collect(chain, count, rng, settings, draw) -> list[tuple[np.ndarray, ...]]:
+def _collect(
+    chain: Chain, count: int, rng: np.random.Generator, settings: SampleSettings, draw: Draw
+) -> list[tuple[np.ndarray, ...]]:
     """Gather chunks of `draw` until there are `count` samples with a settled target inside the limits."""
     parts, missing = [], count
     while missing > 0:

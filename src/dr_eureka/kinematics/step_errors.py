@@ -11,6 +11,7 @@ from typing import Callable
 import numpy as np
 
 from dr_eureka.kinematics.chain import Chain
+from dr_eureka.kinematics.jacobian_step import damped_steps
 from dr_eureka.kinematics.network import ArmNetwork
 from dr_eureka.kinematics.samples import SampleSettings, least_norm_change, moved, pose_errors
 
@@ -27,9 +28,7 @@ def step_methods(chain: Chain, network: ArmNetwork | None, damping: float = 0.05
 
     def pseudo_inverse(lambda_squared: float) -> Method:
         def step(joints: np.ndarray, delta: np.ndarray) -> np.ndarray:
-            jacobians = chain.jacobian(joints)
-            squares = jacobians @ jacobians.transpose(0, 2, 1) + lambda_squared * np.eye(6)
-            return np.einsum("nij,ni->nj", jacobians, np.linalg.solve(squares, delta[..., None])[..., 0])
+            return damped_steps(chain.jacobian(joints), delta, lambda_squared)
 
         return step
 
@@ -74,10 +73,7 @@ def _draw_joint_change(
     wanted = start[:, :3, 3] + size * direction / np.linalg.norm(direction, axis=1, keepdims=True)
     for _ in range(8):
         poses, jacobians = chain.forward_and_jacobian(joints + change)
-        linear = jacobians[:, :3]
-        squares = linear @ linear.transpose(0, 2, 1) + 1e-6 * np.eye(3)
-        missing = np.linalg.solve(squares, (wanted - poses[:, :3, 3])[..., None])
-        change = change + np.clip(np.einsum("nij,ni->nj", linear, missing[..., 0]), -0.2, 0.2)
+        change = change + np.clip(damped_steps(jacobians[:, :3], wanted - poses[:, :3, 3], 1e-6), -0.2, 0.2)
     targets = chain.forward(joints + change)
     delta = pose_errors(start, targets)
     ends = joints + change

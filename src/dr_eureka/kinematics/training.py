@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -77,8 +77,9 @@ def hand_loss(
 def train(plan: TrainingPlan, folder: Path, sample_settings: SampleSettings = SampleSettings()) -> ArmNetwork:
     """Train on the left arm and return the network, going on from the checkpoint in the folder when there is one.
 
-    After each round the folder gets the weights as they ship, checkpoint.npz, and a line in arm_network.csv. A round depends
-    on plan and checkpoint only: a run that was broken off ends with the weights of one that was not.
+    Raises CheckpointError for one that cannot be read or was begun with another plan or other samples. After each round the
+    folder gets the weights as they ship, checkpoint.npz, and a line in arm_network.csv. A round depends on plan and
+    checkpoint only: a run that was broken off ends with the weights of one that was not.
     """
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint, log = folder / CHECKPOINT, folder / LOG
@@ -89,9 +90,9 @@ def train(plan: TrainingPlan, folder: Path, sample_settings: SampleSettings = Sa
     optimiser = torch.optim.Adam(model.parameters(), lr=plan.peak_rate)
     held_out = draw_samples(chain, _VALIDATION, np.random.default_rng([plan.seed, 2**31]), sample_settings)
     stream = SampleStream(chain, sample_settings, plan.seed, plan.block, plan.blocks_kept)
-    first_round = 0
+    first_round, course = 0, asdict(plan) | asdict(sample_settings)
     if checkpoint.exists():
-        first_round = load_checkpoint(checkpoint, {"model": model}, optimiser)
+        first_round = load_checkpoint(checkpoint, {"model": model}, optimiser, course)
     else:
         log.write_text("round,samples_drawn,samples_seen,loss,hand_error_cm,seconds\n")
     network = ArmNetwork(weights_of(model, sample_settings.lower, sample_settings.upper))
@@ -103,7 +104,7 @@ def train(plan: TrainingPlan, folder: Path, sample_settings: SampleSettings = Sa
         network = ArmNetwork(weights)
         error_cm = 100.0 * validation_error(network, held_out)
         save_weights(WEIGHTS, weights, folder)
-        save_checkpoint(checkpoint, {"model": model}, optimiser, number + 1)
+        save_checkpoint(checkpoint, {"model": model}, optimiser, number + 1, course)
         done, seconds = number + 1, time.monotonic() - started
         with log.open("a") as file:
             file.write(f"{done},{done * plan.block},{done * steps * plan.batch},{loss:.5f},{error_cm:.4f},{seconds:.0f}\n")

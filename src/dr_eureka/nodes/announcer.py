@@ -94,6 +94,10 @@ class Announcer:
         """Log that a pour went wrong."""
         rospy.logwarn("tubes: they hold %s, expected %s: planning anew", seen, expected)
 
+    def on_hands(self, message: str) -> None:
+        """Log what was seen of the tubes in the hands."""
+        rospy.logwarn("%s", message)
+
     def on_fault(self, message: str) -> None:
         """Log that a grasp failed."""
         rospy.logwarn("%s: looking again", message)

@@ -51,7 +51,8 @@ def status_to_message(catcher: Catcher, problem: str, stamp: rospy.Time) -> msg.
 def word_from_message(status: msg.CatchStatus) -> RobotWord:
     """Return what the robot says in its status; raises MessageError for a number that the message does not know."""
     result = "" if status.result == msg.CatchStatus.NONE else _named(CatchResult.ALL, status.result)
-    return RobotWord(_named(CatchPhase.ALL, status.phase), status.balls, result, status.reason, status.moves)
+    phase = _named(CatchPhase.ALL, status.phase)
+    return RobotWord(status.header.stamp.to_sec(), phase, status.balls, result, status.reason, status.moves)
 
 
 def _named(names: Sequence[str], number: int) -> str:

@@ -193,9 +193,8 @@ def _serve() -> int:
         calibrations = {hand: load_calibration(folder, hand) for hand in HANDS}
         found = [hand for hand in HANDS if calibration_file(folder, hand).exists()]
         rospy.loginfo("arm calibrations in %s: %s", folder, ", ".join(found) or "none, the arms are taken to be as drawn")
-    engine = ControlEngine(
-        ControlSettings.from_mapping(parameters, where), load_pieces(), ArmNetwork.load(), calibrations, node_settings.wait_for_plans
-    )
+    settings = ControlSettings.from_mapping(parameters, where)
+    engine = ControlEngine(settings, load_pieces(), ArmNetwork.load(), calibrations, node_settings.wait_for_plans)
     return ControlEngineNode(engine, node_settings).serve()
 
 

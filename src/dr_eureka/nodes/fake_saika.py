@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState
 
 from dr_eureka import msg
-from dr_eureka.catching.catch_report import RobotWord, describe_ball
+from dr_eureka.catching.catch_report import describe_ball
 from dr_eureka.catching.catcher_settings import BALLS
 from dr_eureka.catching.description import SIDES
 from dr_eureka.catching.localisation import camera_model
@@ -48,6 +48,7 @@ from dr_eureka.simulation.throws import AIMS, build_throws
 NAME = "fake_saika"
 FILE = "catch.json"
 _LINGER_S = 1.0
+_CONNECT_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -66,12 +67,12 @@ class FakeSaikaSettings:
 class FakeSaika:
     """Simulates robot, cameras and balls; lets a ball go whenever the robot watches for one, and tells how each ended.
 
-    Ends when all balls have: exit code 0 when each ended as it should (caught, or called out of reach when it was).
+    Time stands still until ball_catcher is there. Ends when all balls have: exit code 0 when each ended as it should (caught, or called out of reach when it was).
 
     ROS Publishers:
         * **saika/present_joint_states** (sensor_msgs/JointState): 125 Hz
         * **left_camera/image_raw**, **right_camera/image_raw** (sensor_msgs/Image) with **…/camera_info**
-          (sensor_msgs/CameraInfo): while subscribed to
+          (sensor_msgs/CameraInfo): 30 Hz each
         * **catch_referee** (dr_eureka/CatchReferee): the truth, latched; for people and tests
         * **/clock** (rosgraph_msgs/Clock)
     ROS Subscribers:
@@ -94,7 +95,6 @@ class FakeSaika:
         self._cycle = 0
         self._exposures = {side: world.next_exposure(side) for side in SIDES}
         self._pictures: list[tuple[float, str, float, np.ndarray]] = []
-        self._robot: Optional[RobotWord] = None
         self._notes: queue.SimpleQueue[msg.CatchStatus] = queue.SimpleQueue()
         self._ruling: Optional[msg.CatchReferee] = None
         self._present = rospy.Publisher("saika/present_joint_states", JointState, queue_size=10)
@@ -110,10 +110,11 @@ class FakeSaika:
             "saika/set_joint_states", JointState, self._joint_step.on_command, tcp_nodelay=True
         )
         self._seen = rospy.Subscriber("ball_catcher/balls", msg.SeenBalls, self._picture_step.on_command, tcp_nodelay=True)
-        rospy.Subscriber("ball_catcher/status", msg.CatchStatus, self._notes.put, queue_size=50)
+        self._statuses = rospy.Subscriber("ball_catcher/status", msg.CatchStatus, self._notes.put, queue_size=50)
 
     def run(self) -> None:
         """Simulate until all balls have ended, or shut down."""
+        self._await_robot()
         while not rospy.is_shutdown() and not self._session.over:
             self._cycle += 1
             end_s = self._cycle * self._settings.cycle
@@ -131,6 +132,17 @@ class FakeSaika:
             self._judge(end_s, stamp)
             self._pace.keep(end_s)
 
+    def _await_robot(self) -> None:
+        """Wait until the robot sees, hears and speaks. Time begins then: how fast its node starts changes nothing."""
+        ends = (self._present, *self._images.values(), self._commands, self._seen, self._statuses)
+        while not rospy.is_shutdown() and not all(end.get_num_connections() for end in ends):
+            try:
+                self._session.hear(catch_messages.word_from_message(self._notes.get(timeout=_CONNECT_S)))
+            except queue.Empty:
+                rospy.loginfo_once("time begins when ball_catcher is there")
+        self._joint_step.rely_on_answers()
+        self._picture_step.rely_on_answers()
+
     def _advance_to(self, end_s: float) -> None:
         """Go on to a time, taking the pictures that are due before."""
         while True:
@@ -138,9 +150,8 @@ class FakeSaika:
             if self._exposures[side] > end_s:
                 break
             self._world.step(self._exposures[side] - self._world.time_s)
-            if self._images[side].get_num_connections():
-                taken_s, rgb = self._world.capture(side)
-                self._pictures.append((taken_s + self._settings.picture_delay, side, taken_s, rgb))
+            taken_s, rgb = self._world.capture(side)
+            self._pictures.append((taken_s + self._settings.picture_delay, side, taken_s, rgb))
             self._exposures[side] = self._world.next_exposure(side)
         self._world.step(end_s - self._world.time_s)
 
@@ -172,12 +183,12 @@ class FakeSaika:
     def _judge(self, now_s: float, stamp: rospy.Time) -> None:
         """Take the robot's word, let the next ball go, publish the referee's ruling when it changes."""
         while not self._notes.empty():
-            self._robot = catch_messages.word_from_message(self._notes.get())
+            self._session.hear(catch_messages.word_from_message(self._notes.get()))
         released = self._session.released
         truth: Optional[CatchVerdict] = self._world.referee() if released else None
         verdict = truth.result if truth else NO_BALL
         ended = len(self._session.results)
-        throw = self._session.step(now_s, self._robot, verdict)
+        throw = self._session.step(now_s, verdict)
         if throw is not None:
             self._world.throw_ball(throw.position, throw.velocity)
         if len(self._session.results) > ended:

@@ -34,6 +34,11 @@ class LockStep(Generic[Stamped]):
         """Tell whether a controller keeps step."""
         return self._answering
 
+    def rely_on_answers(self) -> None:
+        """Wait for the very first answer, too: the controller is known to be there."""
+        with self._arrived:
+            self._answering = True
+
     def expect(self, stamp_ns: int) -> None:
         """Name the state that is about to be published."""
         with self._arrived:

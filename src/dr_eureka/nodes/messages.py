@@ -195,6 +195,7 @@ def report_to_message(report: GameReport, now_s: float) -> msg.GameStatus:
                 action=action_to_message(record.action),
                 start=stamp(began_s + record.start_s),
                 end=stamp(began_s + record.end_s),
+                failed=record.failed,
             )
             for record in report.actions
         ],
@@ -222,7 +223,12 @@ def report_from_message(status: msg.GameStatus) -> GameReport:
         pour=status.pour,
         pours=pours_from_messages(status.pours),
         actions=tuple(
-            ActionRecord(action_from_message(record.action), record.start.to_sec() - began_s, record.end.to_sec() - began_s)
+            ActionRecord(
+                action_from_message(record.action),
+                record.start.to_sec() - began_s,
+                record.end.to_sec() - began_s,
+                record.failed,
+            )
             for record in status.actions
         ),
         replans=status.replans,

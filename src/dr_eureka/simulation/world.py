@@ -149,7 +149,10 @@ class World:
         return [(colour, np.array(self._client.getBasePositionAndOrientation(ball)[0])) for colour, ball in self._balls]
 
     def put_ball(self, index: int, centre: np.ndarray) -> None:
-        """Put the ball that `ball_positions` lists at `index` at rest with its centre (3,) in `base` [m]; for `faults` only."""
+        """Put the ball that `ball_positions` lists at `index` at rest with its centre (3,) in `base` [m].
+
+        For `faults` and for what trials begin with; in a game nothing else moves a ball but contact.
+        """
         ball = self._balls[index][1]
         self._client.resetBasePositionAndOrientation(ball, np.asarray(centre).tolist(), (0.0, 0.0, 0.0, 1.0))
         self._client.resetBaseVelocity(ball, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

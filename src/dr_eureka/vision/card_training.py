@@ -10,7 +10,7 @@ import copy
 import math
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import cv2
@@ -89,24 +89,25 @@ def _same(found: list[tuple[float, float, int]], wanted: np.ndarray) -> bool:
 def train(plan: TrainingPlan, folder: Path) -> CardDetector:
     """Train and return the averaged network, going on from the checkpoint in the folder when there is one.
 
-    After each epoch the folder gets the weights as they ship, checkpoint.npz, and a line in the log (a .csv).
+    Raises CheckpointError for one that cannot be read or was begun with another plan. After each epoch the folder gets the
+    weights as they ship, checkpoint.npz, and a line in the log (a .csv).
     """
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint, log = folder / CHECKPOINT, folder / log_name(plan.model)
     torch.set_num_threads(1)
     cv2.setNumThreads(1)
     torch.manual_seed(plan.seed)
-    held_out = CardStream(np.random.default_rng((plan.seed, 10**6)), min(plan.validation_samples, plan.pool))
-    samples = [held_out.sample() for _ in range(plan.validation_samples)]
     network = build_network(plan.model).to(memory_format=torch.channels_last)
     averaged = copy.deepcopy(network)
     optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-4)
     modules = {"network": network, "averaged": averaged}
     first_epoch = 0
     if checkpoint.exists():
-        first_epoch = load_checkpoint(checkpoint, modules, optimiser)
+        first_epoch = load_checkpoint(checkpoint, modules, optimiser, asdict(plan))
     else:
         log.write_text("epoch,samples,loss,map50,exact,seconds\n")
+    held_out = CardStream(np.random.default_rng((plan.seed, 10**6)), min(plan.validation_samples, plan.pool))
+    samples = [held_out.sample() for _ in range(plan.validation_samples)]
     steps = plan.samples_per_epoch // plan.batch
     for epoch in range(first_epoch, plan.epochs):
         started, losses = time.monotonic(), []
@@ -120,7 +121,7 @@ def train(plan: TrainingPlan, folder: Path) -> CardDetector:
             _show_progress(epoch, step + 1, steps, float(np.mean(losses[-50:])))
         map50, exact = validate(averaged, samples)
         save_detector(plan.model, to_arrays(averaged), folder)
-        save_checkpoint(checkpoint, modules, optimiser, epoch + 1)
+        save_checkpoint(checkpoint, modules, optimiser, epoch + 1, asdict(plan))
         line = (f"{epoch + 1},{(epoch + 1) * steps * plan.batch},{np.mean(losses):.4f},{map50:.4f},{exact:.4f},"
                 f"{time.monotonic() - started:.0f}\n")
         with log.open("a") as file:

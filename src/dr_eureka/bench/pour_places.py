@@ -1,0 +1,60 @@
+"""Where the robot sees tubes that stand a little beside their nominal places: how trials of pours begin."""
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dr_eureka.bench.pour_spread import Spread
+from dr_eureka.errors import DrEurekaError
+from dr_eureka.game.hands import HANDS
+from dr_eureka.kinematics.arms import base_from_camera
+from dr_eureka.pieces import Pieces
+from dr_eureka.simulation.rendering import SceneTextures
+from dr_eureka.simulation.settings import CameraSettings, WorldSettings
+from dr_eureka.simulation.stage import Stage
+from dr_eureka.simulation.world import World
+from dr_eureka.vision.camera import CameraModel
+from dr_eureka.vision.sheet_renderer import sheet_image
+from dr_eureka.vision.tubes import TubeResult, TubeSettings, locate_tubes
+
+
+# Pitch of the head that looks at the sheet.
+LOOKING_DOWN_RAD = 0.8
+
+
+class PourPlacesError(DrEurekaError):
+    """Tubes that could not be located; `result` is one of TubeResult."""
+
+    def __init__(self, result: str, reason: str):
+        super().__init__(f"the tubes to pour with were not located: {result}: {reason}; expected three standing on the sheet")
+        self.result = result
+
+
+def scattered(world: WorldSettings, spread: Spread) -> WorldSettings:
+    """Return settings of a world whose seed puts tubes and materials off by no more than a spread, and not the sheet."""
+    scatter = replace(world.scatter, sheet=0.0, sheet_yaw=0.0, tubes=spread.placement, materials=spread.materials)
+    return replace(world, scatter=scatter)
+
+
+def nominal_feet(world: WorldSettings) -> dict[str, np.ndarray]:
+    """Return the foot (3,) [m] in base of each hand's tube where the layout puts it."""
+    return {hand: np.array([*world.layout.tubes_in_sheet[hand], 0.0]) + world.layout.sheet_centre for hand in HANDS}
+
+
+def located_feet(
+    world: WorldSettings, seed: int, pieces: Pieces, camera: CameraSettings, tubes: TubeSettings, stage: Stage
+) -> dict[str, np.ndarray]:
+    """Return the foot (3,) [m] in base of each hand's tube as the robot's head sees it, hands out of the picture.
+
+    A world of equal scatter and seed has its tubes in the same places. `stage`: one with a renderer. Raises PourPlacesError.
+    """
+    joints = {**world.layout.start_joints, "head_p": LOOKING_DOWN_RAD}
+    world = replace(world, layout=replace(world.layout, start_joints=joints))
+    watched = World(world, seed, textures=SceneTextures(sheet=sheet_image(pieces)), pieces=pieces, camera=camera, stage=stage)
+    matrix = np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
+    model = CameraModel(camera.width, camera.height, matrix, camera.distortion)
+    scene = locate_tubes(watched.camera_image(), model, base_from_camera(watched.joint_positions()), pieces, tubes)
+    if scene.result != TubeResult.OK:
+        raise PourPlacesError(scene.result, scene.reason)
+    return {hand: scene.tubes[hand].position for hand in HANDS}
