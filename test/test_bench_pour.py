@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 
-from dr_eureka.bench.pour import STATED, TABLE_2, as_pour_trials, rows_of, wide_rows
+from dr_eureka.bench.pour import TABLE_2, as_pour_trials, rows_of, wide_rows
+from dr_eureka.bench.pour_places import located_feet, nominal_feet, scattered
 from dr_eureka.bench.pour_rig import PourKind, PourRig
-from dr_eureka.bench.pour_rounds import CONTROL, Trial, direct_kinds, lock_kinds
-from dr_eureka.bench.pour_spread import NONE, mistimed
+from dr_eureka.bench.pour_rounds import CONTROL, Trial, direct_kinds, fewer_kinds, lock_kinds
+from dr_eureka.bench.pour_spread import NONE, STATED, mistimed
 from dr_eureka.control.settings import ControlSettings
+from dr_eureka.game.hands import HANDS
 from dr_eureka.pieces import load_pieces
 from dr_eureka.resources import load_yaml
-from dr_eureka.simulation.settings import load_world_settings
+from dr_eureka.simulation.placement import draw_placement
+from dr_eureka.simulation.settings import load_camera_settings, load_world_settings
 from dr_eureka.simulation.stage import Stage
+from dr_eureka.vision.tubes import TubeSettings
 
 SETTINGS = ControlSettings.from_mapping(load_yaml(CONTROL), CONTROL)
 
@@ -33,6 +37,26 @@ def test_all_pours_of_table_2_and_all_locks_that_six_balls_allow_are_tried():
         (hand, held, there)
         for hand in ("left", "right") for held in (1, 2, 3, 4) for there in (0, 1, 2, 3) if held + there <= 6
     }
+
+
+def test_the_wide_spread_tries_every_lock_pour_within_eight_rounds():
+    tried = [kind for number in range(8) for kind in fewer_kinds(number)]
+    assert set(kind for kind in tried if kind.method == "lock") == set(lock_kinds())
+    assert {(kind.held, kind.count) for kind in fewer_kinds(3) if kind.method == "linear"} == set(TABLE_2)
+
+
+def test_tubes_that_stand_beside_their_places_are_located_by_the_robots_camera():
+    world, camera, pieces = scattered(load_world_settings(), STATED), load_camera_settings(), load_pieces()
+    stage = Stage(camera.renderer)
+    try:
+        seen = located_feet(world, 5, pieces, camera, TubeSettings.load(), stage)
+    finally:
+        stage.close()
+    true, nominal = draw_placement(world, 5, np.zeros(3)).tubes, nominal_feet(world)
+    for hand in HANDS:
+        beside = np.abs(true[hand] - nominal[hand])[:2]
+        assert beside.max() <= STATED.placement and beside.max() > 0.0015
+        assert np.linalg.norm(seen[hand] - true[hand]) < 0.0015
 
 
 def test_rows_count_what_went_right_beside_the_paper():
