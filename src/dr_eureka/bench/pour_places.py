@@ -19,8 +19,8 @@ from dr_eureka.vision.sheet_renderer import sheet_image
 from dr_eureka.vision.tubes import TubeResult, TubeSettings, locate_tubes
 
 
-# Pitch of the head that looks at the sheet.
-LOOKING_DOWN_RAD = 0.8
+# [rad] as in a game: see `sheet_gaze` in config/dr_eureka_main.yaml.
+SHEET_GAZE = {"head_y": 0.04, "head_p": 0.87}
 
 
 class PourPlacesError(DrEurekaError):
@@ -49,7 +49,7 @@ def located_feet(
 
     A world of equal scatter and seed has its tubes in the same places. `stage`: one with a renderer. Raises PourPlacesError.
     """
-    joints = {**world.layout.start_joints, "head_p": LOOKING_DOWN_RAD}
+    joints = {**world.layout.start_joints, **SHEET_GAZE}
     world = replace(world, layout=replace(world.layout, start_joints=joints))
     watched = World(world, seed, textures=SceneTextures(sheet=sheet_image(pieces)), pieces=pieces, camera=camera, stage=stage)
     matrix = np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
