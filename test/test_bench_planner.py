@@ -1,4 +1,6 @@
 """The checks of the planner: they know the puzzle by themselves, and they find a planner out that errs."""
+from dataclasses import replace
+
 import networkx
 import pytest
 from scipy.sparse.csgraph import shortest_path
@@ -8,7 +10,7 @@ from dr_eureka.bench.planner_chances import ChanceModel
 from dr_eureka.bench.planner_model import BALL, ActionGraph, Costs, explore, moves
 from dr_eureka.bench.report import BenchOptions
 from dr_eureka.game.planner import Planner
-from dr_eureka.game.planner_settings import load_planner_settings
+from dr_eureka.game.planner_settings import Outcome, load_planner_settings
 from dr_eureka.game.state import TUBES, Pour, State, all_states
 
 SETTINGS = load_planner_settings()
@@ -64,11 +66,11 @@ def test_a_single_pour_costs_its_ball_and_four_picks_and_places(texts):
 
 
 def test_the_chance_of_one_pour_is_the_share_that_goes_as_intended_or_is_mended(texts):
-    model = ChanceModel(texts, SETTINGS, "linear")
-    outcome = SETTINGS.outcomes["linear"][4][1]
+    outcome = Outcome(intended=0.9, fewer=0.04, more=0.04, lost=0.02)
+    pours = {held: {count: outcome for count in by_count} for held, by_count in SETTINGS.outcomes["linear"].items()}
+    settings = replace(SETTINGS, outcomes={**SETTINGS.outcomes, "linear": pours})
     # One ball short is poured again; one ball over is poured back, one out of three, which is as risky.
-    assert outcome == SETTINGS.outcomes["linear"][3][1]
-    chance, _ = model.solve("RRGG|P|P", "RRG|PG|P")
+    chance, _ = ChanceModel(texts, settings, "linear").solve("RRGG|P|P", "RRG|PG|P")
     assert chance == pytest.approx(outcome.intended / (1 - outcome.fewer - outcome.more), abs=1e-9)
 
 

@@ -23,6 +23,9 @@ def test_the_shipped_settings_know_both_ways_to_pour():
     assert settings.reach == {"left": ("left", "center"), "right": ("center", "right")}
 
 
+LOPSIDED = {"intended": 0.8, "fewer": 0.08, "more": 0.5, "lost": 0.04}
+
+
 @pytest.mark.parametrize(
     "change, message",
     [
@@ -36,7 +39,7 @@ def test_the_shipped_settings_know_both_ways_to_pour():
         (lambda c: c["durations"]["upright"]["lock"].update(seconds=-1.0), "durations.upright.lock.seconds: is -1.0"),
         (lambda c: c["durations"]["upright"].pop("linear"), "durations.upright: lacks the key 'linear'"),
         (lambda c: c["outcomes"].pop("linear"), "outcomes: lacks the key 'linear'"),
-        (lambda c: c["outcomes"]["linear"][4][3].update(more=0.5), "outcomes.linear.4.3: shares add up to 1.42; expected 1"),
+        (lambda c: c["outcomes"]["linear"][4].update({3: LOPSIDED}), "outcomes.linear.4.3: shares add up to 1.42; expected 1"),
         (
             lambda c: c["outcomes"]["linear"][2].update({2: {"intended": 0.9, "more": 0.1}}),
             "outcomes.linear.2.2.more: is 0.1; expected 0, for the tube holds 2 balls",

@@ -36,7 +36,7 @@ def rewrite(text: str, figures: Mapping[Key, Figure]) -> str:
     content = yaml.load(text)
     for key, figure in figures.items():
         node = figure_at(content, key)
-        for name in set(node) - set(figure):
+        for name in list(node):
             del node[name]
         node.update(figure)
     stream = io.StringIO()
