@@ -48,12 +48,16 @@ class GameTest(unittest.TestCase):
         last = self.topic("referee")[-1]
         self.assertEqual((last.state, last.balls_lost, sorted(last.tubes_standing)), (GOAL, 0, ["center", "left", "right"]))
 
-    def test_the_actions_follow_one_another_in_robot_time(self):
+    def test_both_hands_pick_and_place_at_once_and_actions_follow_one_another_in_robot_time(self):
         actions = self.result["actions"]
         # More follow only if a pour went wrong and a new plan was made.
         self.assertEqual([action["kind"] for action in actions[:5]], ["pick", "pick", "pour", "place", "place"])
+        first_pick, second_pick, pour, first_place, second_place = (
+            (action["start"], action["end"]) for action in actions[:5]
+        )
+        self.assertEqual((first_pick, first_place), (second_pick, second_place))
+        self.assertEqual((pour[0], first_place[0]), (first_pick[1], pour[1]))
         ends = [action["end"] for action in actions]
-        self.assertEqual([action["start"] for action in actions[1:5]], ends[:4])
         self.assertEqual(ends, sorted(ends))
         self.assertLessEqual(ends[-1], self.result["simulated_seconds"])
 
