@@ -140,8 +140,10 @@ def test_what_to_pour_next_follows_the_plan_and_ends_at_the_goal():
 
 
 def test_a_pour_may_end_one_ball_short_or_one_ball_over_or_beside_the_tubes(planner_for):
-    planner = planner_for(START, "surest", "linear")
-    outcome = SETTINGS.outcomes["linear"][4][2]
+    outcome = Outcome(0.9, fewer=0.04, more=0.04, lost=0.02)
+    linear = {**SETTINGS.outcomes["linear"], 4: {count: outcome for count in (1, 2, 3, 4)}}
+    settings = replace(SETTINGS, outcomes={**SETTINGS.outcomes, "linear": linear})
+    planner = planner_for(START, "surest", "linear", settings=settings)
     results = planner.results_of(Pour("left", "right", 2), State.parse("RRGG|PP|"), START)
     assert {None if r.state is None else str(r.state): r.share for r in results} == {
         "RRG|PP|G": outcome.fewer, "R|PP|GGR": outcome.more, None: outcome.lost,
