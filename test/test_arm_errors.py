@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dr_eureka.bench.simulated_calibration import SimulatedRobot, camera_model, imperfect, tubes_aside
+from dr_eureka.bench.simulated_calibration import SimulatedRobot, imperfect, tubes_aside
 from dr_eureka.kinematics.arms import BASE_LINK, URDF, arm_chain, arm_joint_names
 from dr_eureka.kinematics.chain import Chain
 from dr_eureka.kinematics.transforms import rotation_vector
 from dr_eureka.pieces import load_pieces
 from dr_eureka.resources import resource_path
 from dr_eureka.simulation.arm_errors import ArmErrorSettings, draw_arm_errors, stretch_links
+from dr_eureka.simulation.camera_model import camera_model
 from dr_eureka.simulation.settings import load_camera_settings, load_world_settings
 from dr_eureka.simulation.world import World
 from dr_eureka.vision.hand_marker import HandMarkerError, locate_hand

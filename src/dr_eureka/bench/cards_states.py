@@ -7,17 +7,15 @@ alone, and the outcome does not depend on how many processes share the work.
 from __future__ import annotations
 
 import math
-import multiprocessing
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 
 import cv2
 import numpy as np
 
-from dr_eureka.bench.report import progress
+from dr_eureka.bench.workers import shared_out
 from dr_eureka.game.state import all_states
 from dr_eureka.vision.card_scenes import CardScene, random_scene
 from dr_eureka.vision.card_views import HELD_OUT_VIEWS, ViewRanges
@@ -102,9 +100,9 @@ def run_trials(
     processes: how many work, by default one a core. Raises WeightsError or SettingsError as CardReader does.
     """
     work = partial(_read_state, series, seed, views)
-    with _workers(processes or len(os.sched_getaffinity(0))) as spread:
-        groups = progress(spread(work, states), len(states), f"cards, {series.name}")
-        return [trial for group in groups for trial in group]
+    _prepare()  # here too: weights that cannot be loaded are told as an error, not as a worker that dies
+    groups = shared_out(work, states, processes, f"cards, {series.name}", _prepare, at_a_time=4)
+    return list(chain.from_iterable(groups))
 
 
 _reader: CardReader | None = None
@@ -129,15 +127,3 @@ def _read_state(series: Series, seed: int, views: int, state: str) -> list[Trial
             scene.view.defocus_px,
         ))
     return trials
-
-
-@contextmanager
-def _workers(processes: int) -> Iterator:
-    """Give a map that keeps the order: the built-in one, or that of a pool of processes."""
-    _prepare()  # here too: weights that cannot be loaded are told as an error, not as a worker that dies
-    if processes == 1:
-        yield map
-        return
-    # A fork would copy the state of torch's threads; a new interpreter starts clean.
-    with multiprocessing.get_context("spawn").Pool(processes, _prepare) as pool:
-        yield partial(pool.imap, chunksize=4)

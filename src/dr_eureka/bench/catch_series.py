@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
 
 from dr_eureka.bench.catch_trials import CatchRun, Conditions, Trial
-from dr_eureka.bench.report import BenchOptions, progress
+from dr_eureka.bench.report import BenchOptions
+from dr_eureka.bench.workers import shared_out
 from dr_eureka.catching.arm_network import SaikaNetwork
 from dr_eureka.catching.ball_track import BALLISTIC
 from dr_eureka.catching.catcher_settings import CatcherSettings
@@ -60,13 +59,7 @@ class Outcome:
 
 def run_series(series: Series, options: BenchOptions, count: int, label: str) -> list[Outcome]:
     """Let so many balls go, in order; `options.processes`: how many work, by default one a core."""
-    workers = min(options.processes or len(os.sched_getaffinity(0)), count)
-    one = partial(run_one, series, options.seed)
-    if workers == 1:
-        return [one(index) for index in progress(range(count), count, label)]
-    # A fork would share the renderer's state; a new interpreter starts clean.
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
-        return list(progress(pool.imap(one, range(count), chunksize=2), count, label))
+    return shared_out(partial(run_one, series, options.seed), range(count), options.processes, label, at_a_time=2)
 
 
 def run_one(series: Series, seed: int, index: int) -> Outcome:

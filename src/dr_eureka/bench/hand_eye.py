@@ -9,7 +9,7 @@ import numpy as np
 
 from dr_eureka.behaviour.arm_calibration import ArmCalibrationSettings, HandShow
 from dr_eureka.bench.report import BenchError, BenchOptions, Row, mean_row, progress
-from dr_eureka.bench.simulated_calibration import SimulatedRobot, camera_model, imperfect, tubes_aside
+from dr_eureka.bench.simulated_calibration import SimulatedRobot, imperfect, tubes_aside
 from dr_eureka.control.arm import Arm
 from dr_eureka.control.arm_calibration import ArmCalibration
 from dr_eureka.control.codes import EngineCode
@@ -22,6 +22,7 @@ from dr_eureka.game.planner_settings import load_planner_settings
 from dr_eureka.kinematics.arms import arm_chain
 from dr_eureka.pieces import Pieces, load_pieces
 from dr_eureka.resources import load_yaml
+from dr_eureka.simulation.camera_model import camera_model
 from dr_eureka.simulation.rendering import SceneTextures
 from dr_eureka.simulation.settings import load_camera_settings, load_world_settings
 from dr_eureka.simulation.world import World

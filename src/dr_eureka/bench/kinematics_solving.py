@@ -6,8 +6,6 @@ Source of the form: Beeson and Ames, "TRAC-IK: An Open-Source Library for Improv
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +14,8 @@ import numpy as np
 
 from dr_eureka.bench.kinematics_poses import tube_poses
 from dr_eureka.bench.kinematics_solvers import HYBRID, JACOBIAN, METHODS, PAPER_HYBRID, PAPER_JACOBIAN, Answer, solvers
-from dr_eureka.bench.report import BenchOptions, Row, mean_row, progress, share_row
+from dr_eureka.bench.report import BenchOptions, Row, mean_row, share_row
+from dr_eureka.bench.workers import shared_out
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.kinematics.arms import SIDES, arm_chain, mirror
 from dr_eureka.kinematics.chain import Chain
@@ -61,13 +60,7 @@ def measure_solving(options: BenchOptions) -> tuple[dict[tuple[str, str], Trials
         shares.append(share)
         blocks += [(side, first, poses[first : first + _BLOCK]) for first in range(0, len(poses), _BLOCK)]
     run = partial(_solve_block, settings, options.seed)
-    count = min(options.processes or len(os.sched_getaffinity(0)), len(blocks))
-    label = "kinematics, poses"
-    if count == 1:
-        results = [run(block) for block in progress(blocks, len(blocks), label)]
-    else:
-        with multiprocessing.get_context("spawn").Pool(count) as pool:
-            results = list(progress(pool.imap(run, blocks), len(blocks), label))
+    results = shared_out(run, blocks, options.processes, "kinematics, poses")
     keys = results[0]
     return {key: Trials(*np.hstack([result[key] for result in results])) for key in keys}, float(np.mean(shares))
 

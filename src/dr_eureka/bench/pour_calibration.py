@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 
-from dr_eureka.bench.pour_rig import PourKind, Poured
+from dr_eureka.bench.pour_rig import PourKind, Poured, PourRig
 from dr_eureka.bench.report import progress
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.errors import DrEurekaError
@@ -72,22 +73,20 @@ class Notes:
         return self._arrived[key]
 
 
-def search(make_rig: Callable[[int], object], control: ControlSettings, grasps: int, notes: Notes) -> dict[str, dict[int, Turn]]:
+def search(make_rig: Callable[[int], PourRig], control: ControlSettings, grasps: int, notes: Notes) -> dict[str, dict[int, Turn]]:
     """Return by method, then by how many balls stay behind, when to turn back; raises PourCalibrationError.
 
     `make_rig`: gives the PourRig with the grasp of that number; it is only asked for where something is left to try.
     """
     arrived = {method: np.zeros((len(turns), grasps), dtype=int) for method, turns in TURNS.items()}
     for grasp in progress(iter(range(grasps)), grasps, "grasps"):
-        rigs: list = []
+        rig = cache(partial(make_rig, grasp))
         for method, turns in TURNS.items():
             for row, turn in enumerate(turns):
 
                 def attempt() -> Poured:
-                    if not rigs:
-                        rigs.append(make_rig(grasp))
                     kind = PourKind(method, HANDS[grasp % len(HANDS)], TUBE_CAPACITY, TUBE_CAPACITY, 0)
-                    return rigs[0].pour(kind, told(control, {method: {0: turn}}))
+                    return rig().pour(kind, told(control, {method: {0: turn}}))
 
                 arrived[method][row, grasp] = notes.arrived(method, grasp, turn, attempt)
     return {method: best_turns(method, turns, arrived[method]) for method, turns in TURNS.items()}

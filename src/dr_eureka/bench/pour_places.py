@@ -10,14 +10,13 @@ from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.hands import HANDS
 from dr_eureka.kinematics.arms import base_from_camera
 from dr_eureka.pieces import Pieces
+from dr_eureka.simulation.camera_model import camera_model
 from dr_eureka.simulation.rendering import SceneTextures
 from dr_eureka.simulation.settings import CameraSettings, WorldSettings
 from dr_eureka.simulation.stage import Stage
 from dr_eureka.simulation.world import World
-from dr_eureka.vision.camera import CameraModel
 from dr_eureka.vision.sheet_renderer import sheet_image
 from dr_eureka.vision.tubes import TubeResult, TubeSettings, locate_tubes
-
 
 # [rad] as in a game: see `sheet_gaze` in config/dr_eureka_main.yaml.
 SHEET_GAZE = {"head_y": 0.04, "head_p": 0.87}
@@ -52,9 +51,8 @@ def located_feet(
     joints = {**world.layout.start_joints, **SHEET_GAZE}
     world = replace(world, layout=replace(world.layout, start_joints=joints))
     watched = World(world, seed, textures=SceneTextures(sheet=sheet_image(pieces)), pieces=pieces, camera=camera, stage=stage)
-    matrix = np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
-    model = CameraModel(camera.width, camera.height, matrix, camera.distortion)
-    scene = locate_tubes(watched.camera_image(), model, base_from_camera(watched.joint_positions()), pieces, tubes)
+    pose = base_from_camera(watched.joint_positions())
+    scene = locate_tubes(watched.camera_image(), camera_model(camera), pose, pieces, tubes)
     if scene.result != TubeResult.OK:
         raise PourPlacesError(scene.result, scene.reason)
     return {hand: scene.tubes[hand].position for hand in HANDS}

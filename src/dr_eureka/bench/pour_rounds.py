@@ -5,8 +5,6 @@ share the work. The rounds of one kind of pour are independent of one another.
 """
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -17,7 +15,7 @@ import numpy as np
 from dr_eureka.bench.pour_places import PourPlacesError, located_feet, scattered
 from dr_eureka.bench.pour_rig import PourKind, PourRig
 from dr_eureka.bench.pour_spread import Spread, mistimed
-from dr_eureka.bench.report import progress
+from dr_eureka.bench.workers import shared_out
 from dr_eureka.control.codes import ControlError
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.game.hands import HANDS
@@ -74,13 +72,8 @@ def run_rounds(
 
     `kinds_of`: the kinds of pours that a round of that number tries; `processes`: how many work, by default one a core.
     """
-    count, play = processes or len(os.sched_getaffinity(0)), partial(_round, spread, seed, kinds_of)
-    if count == 1:
-        _prepare()
-        return list(chain.from_iterable(progress(map(play, range(rounds)), rounds, label)))
-    # A fork would share the physics engine's state; a new interpreter starts clean.
-    with multiprocessing.get_context("spawn").Pool(count, _prepare) as pool:
-        return list(chain.from_iterable(progress(pool.imap(play, range(rounds)), rounds, label)))
+    tried = shared_out(partial(_round, spread, seed, kinds_of), range(rounds), processes, label, _prepare)
+    return list(chain.from_iterable(tried))
 
 
 @dataclass(frozen=True, eq=False)

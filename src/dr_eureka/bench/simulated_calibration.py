@@ -7,7 +7,7 @@ from typing import Mapping
 
 from dr_eureka.behaviour.arm_calibration import View
 from dr_eureka.kinematics.arms import base_from_camera
-from dr_eureka.simulation.settings import CameraSettings, WorldSettings
+from dr_eureka.simulation.settings import WorldSettings
 from dr_eureka.simulation.world import World
 from dr_eureka.vision.camera import CameraModel
 
@@ -27,12 +27,6 @@ def tubes_aside(settings: WorldSettings) -> WorldSettings:
     """Return a world's settings with the tubes out of the hands' way, and coarser physics: nothing is to be touched."""
     physics = replace(settings.physics, steps_per_cycle=2)
     return replace(settings, physics=physics, layout=replace(settings.layout, tubes_in_sheet=TUBES_ASIDE))
-
-
-def camera_model(settings: CameraSettings) -> CameraModel:
-    """Return the calibration of the simulated camera."""
-    matrix = ((settings.fx, 0.0, settings.cx), (0.0, settings.fy, settings.cy), (0.0, 0.0, 1.0))
-    return CameraModel(settings.width, settings.height, matrix, settings.distortion)
 
 
 class SimulatedRobot:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import multiprocessing
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -15,8 +14,9 @@ import numpy as np
 
 from dr_eureka.bench.calibration import photograph_rows
 from dr_eureka.bench.hand_eye import run_rows
-from dr_eureka.bench.report import BenchOptions, Row, mean_row, progress, share_row
+from dr_eureka.bench.report import BenchOptions, Row, mean_row, share_row
 from dr_eureka.bench.tubes_scenes import SERIES, Eyes, Series, Trial, judge, take_shot
+from dr_eureka.bench.workers import shared_out
 from dr_eureka.simulation.settings import load_camera_settings
 from dr_eureka.simulation.stage import Stage
 from dr_eureka.vision.tubes import TubeResult
@@ -53,14 +53,7 @@ def run(options: BenchOptions) -> list[Row]:
 
 def run_trials(series: Series, seed: int, scenes: int, processes: int | None = None) -> list[Trial]:
     """Judge so many scenes, in order; `processes`: how many work, by default one a core."""
-    count = processes or len(os.sched_getaffinity(0))
-    label = f"tubes, {series.name}"
-    if count == 1:
-        _prepare()
-        return [_trial(series, seed, index) for index in progress(range(scenes), scenes, label)]
-    # A fork would share the renderer's state; a new interpreter starts clean.
-    with multiprocessing.get_context("spawn").Pool(count, _prepare) as pool:
-        return list(progress(pool.imap(partial(_trial, series, seed), range(scenes), chunksize=4), scenes, label))
+    return shared_out(partial(_trial, series, seed), range(scenes), processes, f"tubes, {series.name}", _prepare, at_a_time=4)
 
 
 def place_rows(name: str, trials: Sequence[Trial]) -> list[Row]:

@@ -18,6 +18,7 @@ from dr_eureka.kinematics.arms import base_from_camera
 from dr_eureka.pieces import Pieces, load_pieces
 from dr_eureka.resources import load_yaml
 from dr_eureka.settings import build
+from dr_eureka.simulation.camera_model import camera_model
 from dr_eureka.simulation.placement import draw_placement
 from dr_eureka.simulation.rendering import SceneTextures
 from dr_eureka.simulation.settings import CameraSettings, WorldSettings, load_camera_settings, load_world_settings
@@ -135,10 +136,8 @@ def take_shot(stage: Stage, series: Series, seed: int, index: int) -> Shot:
     held = world.referee().tubes
     # The robot names tubes by where they stand, from its left to its right.
     order = sorted(TUBES, key=lambda name: -feet[name][1])
-    matrix = [[camera_settings.fx, 0, camera_settings.cx], [0, camera_settings.fy, camera_settings.cy], [0, 0, 1]]
-    camera = CameraModel(camera_settings.width, camera_settings.height, np.array(matrix), camera_settings.distortion)
     seen = State(tuple(held[name] for name in order))
-    return Shot(image, camera, pose, np.array([feet[name] for name in order]), str(seen))
+    return Shot(image, camera_model(camera_settings), pose, np.array([feet[name] for name in order]), str(seen))
 
 
 def _arrange(

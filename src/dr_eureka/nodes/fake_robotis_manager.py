@@ -25,6 +25,7 @@ from dr_eureka.nodes.parameters import private_parameters, refuse_rest, take, ta
 from dr_eureka.nodes.runner import run_node
 from dr_eureka.pieces import load_pieces
 from dr_eureka.settings import build
+from dr_eureka.simulation.camera_model import camera_model
 from dr_eureka.simulation.card_holder import CardChange, CardHolder
 from dr_eureka.simulation.faults import Fault, PourSpoiler
 from dr_eureka.simulation.joints import ALL_JOINTS
@@ -263,11 +264,9 @@ def _serve() -> int:
     refuse_rest(parameters)
     textures = SceneTextures(sheet=sheet_image(load_pieces()))
     world = World(world_settings, seed, start, textures, camera=camera)
-    matrix = ((camera.fx, 0.0, camera.cx), (0.0, camera.fy, camera.cy), (0.0, 0.0, 1.0))
-    model = CameraModel(camera.width, camera.height, matrix, camera.distortion)
     try:
         return FakeRobotisManager(
-            world, start, model, CardHolder(seed, card), seed, pace, world_settings.cycle, node_settings
+            world, start, camera_model(camera), CardHolder(seed, card), seed, pace, world_settings.cycle, node_settings
         ).run()
     finally:
         world.close()

@@ -17,6 +17,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from dr_eureka.pieces import Pieces
 from dr_eureka.simulation.meshes import write_picture_plane
+from dr_eureka.simulation.camera_model import camera_model
 from dr_eureka.simulation.placement import Placement
 from dr_eureka.simulation.robot import SimulatedRobot
 from dr_eureka.simulation.settings import CameraSettings, SimulationError
@@ -230,7 +231,7 @@ def _distortion_maps(settings: CameraSettings) -> tuple[np.ndarray, np.ndarray] 
     """Return where each pixel of the distorted picture lies in the rendered, straight one; None without distortion."""
     if not any(settings.distortion):
         return None
-    matrix = np.array([[settings.fx, 0, settings.cx], [0, settings.fy, settings.cy], [0, 0, 1]])
+    matrix = camera_model(settings).matrix
     columns, rows = np.meshgrid(np.arange(settings.width), np.arange(settings.height))
     pixels = np.stack([columns, rows], axis=-1).reshape(-1, 1, 2).astype(np.float64)
     straight = cv2.undistortPoints(pixels, matrix, np.array(settings.distortion), P=matrix)
