@@ -132,6 +132,11 @@ def test_the_yaml_gets_new_figures_and_keeps_all_else():
     assert f"    lock: {{seconds: {UPRIGHT['lock']}, trials: " in changed
 
 
+def test_names_in_quotes_keep_them_as_ros_wants_numbers_for_names():
+    text = 'turns:\n  "2": {"1": 213, "2": 390} # steps\n'
+    assert rewrite(text, {("turns", "2"): {"1": 210, "2": 350}}) == text.replace("213", "210").replace("390", "350")
+
+
 def test_the_command_shows_the_figures_beside_those_of_the_yaml(tmp_path, capsys):
     file = tmp_path / "game.json"
     file.write_text(json.dumps({"games": GAMES}))

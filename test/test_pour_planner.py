@@ -79,7 +79,7 @@ def assert_same_way(ways: tuple[np.ndarray, np.ndarray], expected: tuple[np.ndar
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("source, share", [("left", 0.7), ("right", 0.4)])
+@pytest.mark.parametrize("source, share", [("left", 0.7), ("right", 0.8)])
 def test_the_mouths_go_the_same_way_to_one_another_whichever_arm_does_it(method, source, share):
     alone = tubes_on_the_way(holding(SETTINGS), source, method)
     both = tubes_on_the_way(holding(sharing(share)), source, method)

@@ -36,9 +36,10 @@ def rewrite(text: str, figures: Mapping[Key, Figure]) -> str:
     content = yaml.load(text)
     for key, figure in figures.items():
         node = figure_at(content, key)
-        for name in list(node):
+        as_written = {name: name for name in node}  # a name keeps its quotes
+        for name in as_written:
             del node[name]
-        node.update(figure)
+        node.update({as_written.get(name, name): value for name, value in figure.items()})
     stream = io.StringIO()
     yaml.dump(content, stream)
     return stream.getvalue()
