@@ -10,6 +10,7 @@ from dr_eureka.bench.pour_rounds import CONTROL, Trial, direct_kinds, fewer_kind
 from dr_eureka.bench.pour_spread import NONE, STATED, mistimed
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.game.hands import HANDS
+from dr_eureka.game.state import TUBES
 from dr_eureka.pieces import load_pieces
 from dr_eureka.resources import load_yaml
 from dr_eureka.simulation.placement import draw_placement
@@ -53,6 +54,7 @@ def test_tubes_that_stand_beside_their_places_are_located_by_the_robots_camera()
     finally:
         stage.close()
     true, nominal = draw_placement(world, 5, np.zeros(3)).tubes, nominal_feet(world)
+    assert seen.keys() == set(TUBES)
     for hand in HANDS:
         beside = np.abs(true[hand] - nominal[hand])[:2]
         assert beside.max() <= STATED.placement and beside.max() > 0.0015
@@ -77,20 +79,32 @@ def test_a_pour_that_was_refused_is_not_right_and_named():
     refused = Trial(kind, 0.0, "TUBE_SLIPPED")
     rows = rows_of([refused, trial(kind)])
     assert row(rows, "profiled: 1 of 2").value == 0.5
-    assert row(rows, "refused: TUBE_SLIPPED").value == 0.5
+    assert row(rows, "refused or broken off: TUBE_SLIPPED").value == 0.5
     assert [(told.poured, told.lost) for told in as_pour_trials([refused, trial(kind)])] == [(1, 0)]
+
+
+def test_a_pour_that_was_broken_off_is_not_right_and_what_became_of_its_balls_counts():
+    kind = PourKind("lock", "left", 2, 1, 3)
+    slipped = [trial(kind, code="TUBE_SLIPPED"), trial(kind, arrived=-3, lost=5, code="TUBE_SLIPPED")]
+    rows = rows_of(slipped)
+    assert row(rows, "lock from the left: 1 of 2 into 3").value == 0.0
+    assert row(rows, "balls lost").value == 5
+    assert row(rows, "refused or broken off: TUBE_SLIPPED").value == 1.0
+    assert [(told.poured, told.lost) for told in as_pour_trials(slipped)] == [(1, 0), (0, 2)]
 
 
 def test_timing_errors_stay_within_the_spread_and_differ_from_trial_to_trial():
     rng = np.random.default_rng(3)
     shifts = []
     for _ in range(50):
-        late = mistimed(SETTINGS, STATED, rng)
+        late = mistimed(SETTINGS, STATED, rng, 4, 3)
         frames = zip(late.lock_pour.keyframes, SETTINGS.lock_pour.keyframes)
         shifts += [ours.seconds - theirs.seconds for ours, theirs in frames]
         shifts += [late.profiled_pour.dip_seconds[k] - SETTINGS.profiled_pour.dip_seconds[k] for k in range(4)]
+        turns = [settings.linear_pour.step_seconds * settings.linear_pour.return_steps[4][3] for settings in (late, SETTINGS)]
+        shifts.append(turns[0] - turns[1])
     assert max(map(abs, shifts)) <= STATED.timing and np.std(shifts) == pytest.approx(STATED.timing / np.sqrt(3.0), rel=0.15)
-    assert mistimed(SETTINGS, NONE, rng) == SETTINGS
+    assert mistimed(SETTINGS, NONE, rng, 4, 3) == SETTINGS
 
 
 def test_pours_on_the_rig_share_a_grasp_move_just_the_balls_meant_and_repeat():

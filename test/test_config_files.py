@@ -10,7 +10,9 @@ from rosgraph.names import is_legal_name
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
+from dr_eureka.control.settings import ControlSettings
 from dr_eureka.resources import load_yaml
+from dr_eureka.settings import SettingsError
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = sorted((ROOT / "config").glob("**/*.yaml"))
@@ -66,3 +68,14 @@ def test_all_parameters_of_a_launch_file_can_be_sent(launch, arguments, monkeypa
 def test_a_file_holds_plain_finite_values(file):
     for path, value in leaves(load_yaml(file)):
         assert isinstance(value, (bool, int, float, str)) and (isinstance(value, str) or math.isfinite(value)), (path, value)
+
+
+@pytest.mark.parametrize("block, table, key, problem", [
+    ("profiled_pour", "dip_seconds", "2", "profiled_pour.dip_seconds: has the keys 0, 1, 3; expected the keys 0, 1, 2, 3"),
+    ("linear_pour", "return_steps", "3", "linear_pour.return_steps: has the keys 1, 2, 4; expected the keys 1, 2, 3, 4"),
+])
+def test_a_direct_pour_that_lacks_a_turn_is_refused_before_anything_moves(block, table, key, problem):
+    content = load_yaml(ROOT / "config" / "control_engine.yaml")
+    del content[block][table][key]
+    with pytest.raises(SettingsError, match=f"the engine: {problem}"):
+        ControlSettings.from_mapping(content, "the engine")

@@ -132,6 +132,12 @@ def test_the_yaml_gets_new_figures_and_keeps_all_else():
     assert f"    lock: {{seconds: {UPRIGHT['lock']}, trials: " in changed
 
 
+def test_what_both_hands_did_last_in_a_game_that_was_not_solved_does_not_count():
+    unsolved = {**GAMES[0], "solved": False, "actions": [{**action, "start": 0.0, "end": 9.0} for action in GAMES[0]["actions"][:2]]}
+    assert [action["hand"] for action in unsolved["actions"]] == ["left", "right"]
+    assert measure([unsolved]) == {}
+
+
 def test_names_in_quotes_keep_them_as_ros_wants_numbers_for_names():
     text = 'turns:\n  "2": {"1": 213, "2": 390} # steps\n'
     assert rewrite(text, {("turns", "2"): {"1": 210, "2": 350}}) == text.replace("213", "210").replace("390", "350")

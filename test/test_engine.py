@@ -69,7 +69,8 @@ def test_the_engine_holds_both_tubes_after_a_pour_until_it_is_told_what_to_do(pu
     assert actions[engine.status.action_index].kind == "pour"
     held = engine.body.held_poses()
     assert sorted(held) == ["left", "right"]
-    assert held["right"][2, 2] > 0.9 and abs(held["left"][2, 2]) < 0.3
+    leaning = np.arcsin(held["right"][2, 2])
+    assert leaning == pytest.approx(engine.settings.pour_place.target_elevation, abs=1e-3) and abs(held["left"][2, 2]) < 0.3
     for _ in range(100):
         robot.cycle()
     np.testing.assert_allclose([engine.body.held_poses()[name] for name in held], list(held.values()), atol=1e-6)
@@ -176,7 +177,8 @@ def test_nothing_is_poured_once_a_tube_has_slipped_out_of_a_hand(lost):
     assert robot.run() == EngineState.FAULT
     assert engine.status.code == EngineCode.TUBE_SLIPPED and "before the pour" in engine.status.message
     axis_up = [engine.body.arms["left"].pose(row)[2, 2] for row in robot.history[began:]]
-    assert min(axis_up) > 0.9 * axis_up[0] > 0.1
+    # A pour would bring the mouth below the foot.
+    assert min(axis_up) > 0.5 * axis_up[0] > 0.1
 
 
 @pytest.mark.parametrize("moment", [2, 3])

@@ -712,6 +712,17 @@ def test_a_grasp_that_failed_is_tried_again_from_what_is_seen_but_not_without_en
     assert report.message == f"control_engine: {code}: action 1: left hand closed on nothing, after 2 replans"
 
 
+@pytest.mark.parametrize("code", EngineCode.PUT_DOWN)
+def test_a_fault_of_a_hand_after_which_nothing_can_be_read_ends_the_game_by_its_name(code):
+    world = World(goal=GOAL, results=[""], games=2)
+    world.until_playing()
+    world.engine(EngineState.FAULT, code, action_index=1, message="left hand closed on nothing")
+    world.until(Phase.FAILED)
+    report = world.flow.report()
+    assert report.code == GameCode.ENGINE_FAULT and world.flow.over
+    assert report.message.startswith(f"control_engine: {code}: action 1: left hand closed on nothing; afterwards NO_CONTENTS: ")
+
+
 def test_pours_that_a_fault_kept_from_beginning_are_not_counted():
     world, pours = world_in_pause(**dict.fromkeys(TUBES, ""))
     assert world.flow.report().pours == tuple(pours) and len(pours) > 1

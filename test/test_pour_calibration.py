@@ -9,6 +9,7 @@ from dr_eureka.bench import pour_calibration, pour_rig
 from dr_eureka.bench.pour_calibration import TURNS, Notes, PourCalibrationError, best_turns, search, told
 from dr_eureka.bench.pour_rig import Poured
 from dr_eureka.cli import calibrate_pours
+from dr_eureka.control.codes import ControlError, EngineCode
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.resources import load_yaml, resource_path
 
@@ -37,7 +38,7 @@ class TableRig:
 
 
 def test_a_pour_turns_back_where_most_grasps_pour_just_so_many():
-    found = search(TableRig, CONTROL, 4, Notes(None))
+    found = search(TableRig, CONTROL, 4, Notes(None, ""))
     for method, edges in EDGES.items():
         for staying in (1, 2, 3):
             first, last = edges[3 - staying] + max(SHIFTS), edges[4 - staying] + min(SHIFTS)
@@ -65,12 +66,15 @@ def test_settings_told_of_turns_have_them_for_every_number_of_balls():
 def test_a_search_that_was_broken_off_goes_on_from_its_notes(tmp_path):
     file, all_pours = tmp_path / "notes.jsonl", 2 * sum(map(len, TURNS.values()))
     TableRig.pours = 0
-    found = search(TableRig, CONTROL, 2, Notes(file))
+    found = search(TableRig, CONTROL, 2, Notes(file, "a search"))
     assert TableRig.pours == all_pours
     first = TURNS["profiled"][0]
-    assert json.loads(file.read_text().splitlines()[0]) == {"pour": "profiled", "grasp": 0, "turn": first, "arrived": 0}
-    file.write_text("".join(file.read_text().splitlines(keepends=True)[:70]))
-    assert search(TableRig, CONTROL, 2, Notes(file)) == found
+    lines = file.read_text().splitlines(keepends=True)
+    assert [json.loads(line) for line in lines[:2]] == [
+        {"search": "a search"}, {"pour": "profiled", "grasp": 0, "turn": first, "arrived": 0}
+    ]
+    file.write_text("".join(lines[:71]))
+    assert search(TableRig, CONTROL, 2, Notes(file, "a search")) == found
     assert TableRig.pours == 2 * all_pours - 70
 
 
@@ -78,9 +82,25 @@ def test_tubes_that_never_pour_and_notes_that_are_none_are_named(tmp_path):
     with pytest.raises(PourCalibrationError, match="linear: no turn between 10 and 20 leaves just 0 of 4 balls behind"):
         best_turns("linear", (10, 20), np.zeros((2, 3), dtype=int))
     file = tmp_path / "notes.jsonl"
-    file.write_text('{"pour": "profiled"}\n')
-    with pytest.raises(PourCalibrationError, match="notes.jsonl:1: "):
-        Notes(file)
+    for text, problem in [
+        ('{"pour": "profiled"}\n', "notes.jsonl:1: "),
+        ('{"search": "a search"}\n{"pour": "profiled", "grasp": 0, "turn": 70, "arrived": null}\n', "notes.jsonl:2: "),
+        ('{"search": "another"}\n', "notes.jsonl: notes of a search with another seed, or other settings"),
+        ("\udcff\n", "notes.jsonl:1: "),
+    ]:
+        file.write_text(text, errors="surrogateescape")
+        with pytest.raises(PourCalibrationError, match=problem):
+            Notes(file, "a search")
+
+
+def test_a_grasp_with_which_nothing_can_be_poured_is_noted_and_the_search_goes_on():
+    def make_rig(grasp):
+        if grasp == 1:
+            raise ControlError(EngineCode.GRASP_EMPTY, "closed on nothing")
+        return TableRig(0)
+
+    found = search(make_rig, CONTROL, 3, Notes(None, ""))
+    assert found["profiled"][2].share == pytest.approx(2 / 3)
 
 
 @pytest.fixture
@@ -99,7 +119,7 @@ def test_the_command_tells_the_engine_what_it_found_and_keeps_all_else(engine_ya
     changed = [(old, new) for old, new in zip(before.splitlines(), engine_yaml.read_text().splitlines()) if old != new]
     assert len(before.splitlines()) == len(engine_yaml.read_text().splitlines())
     assert {old.split(":")[0].strip() for old, _ in changed} <= {"dip_seconds", '"1"', '"2"', '"3"', '"4"'}
-    found = search(TableRig, CONTROL, 4, Notes(None))
+    found = search(TableRig, CONTROL, 4, Notes(None, ""))
     written = ControlSettings.from_mapping(load_yaml(engine_yaml), "written")
     assert written.profiled_pour.dip_seconds == {left: turn.at / 1000.0 for left, turn in found["profiled"].items()}
     assert {held: by_count[held] for held, by_count in written.linear_pour.return_steps.items()} == dict.fromkeys(

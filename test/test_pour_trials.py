@@ -41,6 +41,16 @@ def test_endings_are_counted_for_each_kind_of_pour():
     assert figures["outcomes", "lock", 1, 1] == {"intended": 1.0, "trials": 3}
 
 
+def test_a_lock_pour_of_several_balls_ends_as_one_ball_after_the_other_does():
+    def locks(held, *poured):
+        return [PourTrial("lock", held, 1, count, 0) for count in poured]
+
+    figures = shares([*locks(3, *[1] * 8, 0, 2), *locks(2, *[1] * 15, *[2] * 5), *locks(1, 1, 0)])
+    assert figures["outcomes", "lock", 3, 2] == {"intended": 0.6, "fewer": 0.1, "more": 0.3, "trials": 10}
+    assert figures["outcomes", "lock", 2, 2] == {"intended": 0.625, "fewer": 0.375, "trials": 2}
+    assert ("outcomes", "lock", 4, 2) not in figures
+
+
 def test_shares_that_are_rounded_add_up_all_the_same():
     for total in (3, 7, 99, 4000):
         figure = shares([RIGHT] * (total - 2) + [LESS, LOST])[KEY]

@@ -130,6 +130,18 @@ def test_tubes_stand_where_they_were_placed_and_only_touch_the_board(world):
     assert touching == {("board", f"tube_{name}") for name in TUBES}
 
 
+@pytest.mark.parametrize("friction, restitution", [(0.5, 1.5), (1.2, 0.8)])
+def test_ball_on_tube_differs_from_the_settings_by_just_the_factors_of_its_world(bench, friction, restitution):
+    client, _ = bench
+    maker, physics = BodyMaker(client, SETTINGS.physics, PIECES, friction, restitution), SETTINGS.physics
+    ball, tube = maker.ball((0.0, 0.0, 1.0), "R"), maker.tube((0.0, 0.0, 0.0), fixed=True)
+    # 1: sliding friction, 5: restitution, 6: rolling friction
+    of_ball, of_tube = (client.getDynamicsInfo(body, -1) for body in (ball, tube))
+    assert of_ball[1] * of_tube[1] == pytest.approx(friction * physics.piece_friction**2)
+    assert of_ball[5] * of_tube[5] == pytest.approx(restitution * physics.piece_restitution**2)
+    assert of_ball[6] * of_tube[1] == pytest.approx(physics.rolling_resistance * PIECES.ball_radius)
+
+
 def test_placements_stay_within_their_scatter_and_differ_by_seed():
     scatter, layout = SETTINGS.scatter, SETTINGS.layout
     placements = [draw_placement(SETTINGS, seed, EYE) for seed in range(100)]

@@ -63,6 +63,7 @@ class GameFlow:
         self._game = GameRecord(0, planner.strategy, planner.method, goal=goal)
         self._pours_ahead: tuple[Pour, ...] = ()
         self._playing: Optional[PartInPlay] = None
+        self._fault: Optional[Failure] = None
         self._earlier: tuple[tuple[Pour, ...], tuple[ActionRecord, ...]] = (), ()
 
     @property
@@ -259,16 +260,20 @@ class GameFlow:
             self.fail(fault.code, f"{fault.message}, after {self._game.replans} replans")
             return
         self._listener.on_fault(fault.message)
+        self._fault = fault
         self._begin_tube_look(Phase.CHECKING, self._settings.check_limit)
 
     def _check(self) -> None:
         found = self._found_tubes()
         if isinstance(found, Failure):
-            if found.seen and not self._pours_ahead:
+            if self._fault:
+                self.fail(self._fault.code, f"{self._fault.message}; afterwards {found.code}: {found.message}")
+            elif found.seen and not self._pours_ahead:
                 self._finish(GameCode.UNCHECKED, found.message)
             else:
                 self.fail(found.code, found.message)
         elif found:
+            self._fault = None
             self._listener.on_tubes(found)
             self._judge(found)
 

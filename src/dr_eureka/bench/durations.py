@@ -32,6 +32,8 @@ def read_games(file: Path) -> list[dict[str, Any]]:
         for game in games:
             for action in game["actions"]:
                 action["kind"], action["hand"], action["tube"], float(action["start"]), float(action["end"])
+                if action["kind"] == "pour":
+                    action["count"]
     except OSError as error:
         raise GameFileError(f"{file}: cannot be read: {error.strerror}; expected the game.json of a game") from error
     except (ValueError, TypeError, KeyError, AttributeError) as error:
@@ -51,16 +53,16 @@ def measure(games: Iterable[Mapping[str, Any]]) -> dict[Key, Figure]:
 
     What a game tells as one action may be two: a place right after a pour begins with bringing the tubes upright, a
     strategy's last place ends with the hands at home, a pour begins with bringing the tubes together unless they are. These
-    parts are told apart by least squares; those that cannot be told apart are left out. So is a game's last action unless
-    the game was solved, for it may be unfinished.
+    parts are told apart by least squares; those that cannot be told apart are left out. So are a game's last actions unless
+    the game was solved, for they may be unfinished.
     """
     samples: list[tuple[tuple[Key, ...], float]] = []
     failed: Counter[Key] = Counter()
     for game in games:
         timed = [action for actions in _strategies(game["actions"]) for action in _timed(actions, game["pour"])]
-        done = timed if game.get("solved") else timed[:-1]
-        samples += [(parts, seconds) for parts, seconds, well in done if well]
-        failed.update(part for parts, _, well in timed if not well for part in parts)
+        last = None if game.get("solved") else max((start for start, *_ in timed), default=None)
+        samples += [(parts, seconds) for start, parts, seconds, well in timed if well and start != last]
+        failed.update(part for _, parts, _, well in timed if not well for part in parts)
     keys = sorted({part for parts, _ in samples for part in parts}, key=str)
     if not keys:
         return {}
@@ -90,8 +92,9 @@ def _strategies(actions: list[Mapping[str, Any]]) -> Iterator[list[Mapping[str, 
         yield [action for _, action in group]
 
 
-def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[tuple[Key, ...], float, bool]]:
-    """Yield of each action what it was made of, by its place under `durations`, its duration [s], and whether it went well.
+def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[float, tuple[Key, ...], float, bool]]:
+    """Yield of each action its start [s], what it was made of, by its place under `durations`, its duration [s], and whether it went
+    well.
 
     Actions of both hands at once begin and end together; each counts as lasting that long.
     """
@@ -110,5 +113,5 @@ def _timed(actions: list[Mapping[str, Any]], method: str) -> Iterator[tuple[tupl
                 parts += [("place", hand, tube)] + ([("home",)] if actions[-1] in under_way else [])
             else:
                 parts += [("pour", method, action["count"])] + ([] if again else [("ready", method, tube)])
-            yield tuple(parts), action["end"] - start, not action.get("failed", False)
+            yield start, tuple(parts), action["end"] - start, not action.get("failed", False)
         before = under_way[-1]

@@ -11,6 +11,7 @@ from dr_eureka.bench.pour_rounds import Trial, every_kind, fewer_kinds, lock_kin
 from dr_eureka.bench.pour_spread import STATED, WIDE
 from dr_eureka.bench.pour_trials import PourTrial
 from dr_eureka.bench.report import BenchOptions, Row, mean_row, share_row
+from dr_eureka.control.codes import EngineCode
 
 ROUNDS = 100
 # Share of right pours by balls before and balls to pour, of 10 each (Table 2).
@@ -74,16 +75,18 @@ def wide_rows(trials: Sequence[Trial]) -> list[Row]:
 
 def refusal_rows(prefix: str, trials: Sequence[Trial]) -> list[Row]:
     """Return how many pours the engine refused, or broke off, by its code."""
-    codes = Counter(trial.code for trial in trials if trial.arrived is None)
-    return [share_row(f"{prefix}refused: {code}", count, len(trials)) for code, count in sorted(codes.items())]
+    codes = Counter(trial.code for trial in trials if trial.code != EngineCode.OK)
+    return [share_row(f"{prefix}refused or broken off: {code}", count, len(trials)) for code, count in sorted(codes.items())]
 
 
 def as_pour_trials(trials: Sequence[Trial]) -> list[PourTrial]:
-    """Return what `measure_pours` reads."""
-    return [
-        PourTrial(trial.kind.method, trial.kind.held, trial.kind.count, trial.arrived, trial.lost)
-        for trial in trials if trial.arrived is not None
-    ]
+    """Return what `measure_pours` reads: the pours that began. A ball that sprang out of the receiving tube is lost."""
+    told = []
+    for trial in trials:
+        if trial.arrived is not None:
+            kind, poured = trial.kind, max(trial.arrived, 0)
+            told.append(PourTrial(kind.method, kind.held, kind.count, poured, min(trial.lost, kind.held - poured)))
+    return told
 
 
 def _chosen(trials: Sequence[Trial], method: str, held: int, count: int) -> list[Trial]:

@@ -1,7 +1,7 @@
 """When a direct pour must turn back so that just so many balls pass, found on the robot's own arms in simulation.
 
-Over some grasps, drawn at the stated spread, every turn of a grid is tried with a full tube. For each number of balls the turn is
-taken at which most grasps poured just so many. Where the first ball that stays behind starts does not depend on how many there were
+Over some grasps, drawn at the stated spread with the tubes in their places, every turn of a grid is tried with a full tube. For each
+number of balls the turn is taken at which, and a little before and after, most grasps poured just so many. Where the first ball that stays behind starts does not depend on how many there were
 above it, so that one search serves pours out of fuller and emptier tubes.
 """
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from dr_eureka.bench.pour_rig import PourKind, Poured, PourRig
 from dr_eureka.bench.report import progress
+from dr_eureka.control.codes import ControlError, EngineCode
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.hands import HANDS
@@ -26,6 +27,7 @@ TURNS = {
     "profiled": (*range(70, 170, 3), *range(170, 400, 15)),
     "linear": (*range(135, 240, 3), *range(240, 400, 15)),
 }
+NO_TURNS: Mapping[str, Mapping[int, int]] = {method: {} for method in TURNS}
 # A turn is judged with its neighbours, as a pour may be timed a little wrongly.
 _WEIGHTS = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 
@@ -45,27 +47,38 @@ class Turn:
 class Notes:
     """What was tried and how many balls passed, in a file of one JSON object a line, so that a search can go on later.
 
-    Raises PourCalibrationError for a file that holds something else.
+    `search`: a word for what is searched with; the first line tells it. Raises PourCalibrationError for a file that holds
+    something else, or notes of another search.
     """
 
-    def __init__(self, file: Path | None):
+    def __init__(self, file: Path | None, search: str):
         self._file = file
         self._arrived: dict[tuple[str, int, int], int] = {}
-        if file is not None and file.exists():
-            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
-                try:
-                    note = json.loads(line)
-                    self._arrived[note["pour"], note["grasp"], note["turn"]] = note["arrived"]
-                except (ValueError, TypeError, KeyError) as error:
-                    problem = f"{file}:{number}: {error!r}; expected a note of a search, or no file"
-                    raise PourCalibrationError(problem) from error
+        if file is None:
+            return
+        if not file.exists():
+            file.write_text(json.dumps({"search": search}) + "\n", encoding="utf-8")
+        for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+            try:
+                note = json.loads(line)
+                if number > 1:
+                    self._arrived[note["pour"], note["grasp"], note["turn"]] = int(note["arrived"])
+                elif note["search"] != search:
+                    problem = f"{file}: notes of a search with another seed, or other settings; expected the same, or no file"
+                    raise PourCalibrationError(problem)
+            except (ValueError, TypeError, KeyError) as error:
+                problem = f"{file}:{number}: {error!r}; expected a note of a search, or no file"
+                raise PourCalibrationError(problem) from error
 
     def arrived(self, method: str, grasp: int, turn: int, attempt: Callable[[], Poured]) -> int:
-        """Return how many balls passed with that turn, -1 where one was lost, trying it if nobody has."""
+        """Return how many balls passed with that turn, -1 where one was lost or no pour was made, trying it if nobody has."""
         key = method, grasp, turn
         if key not in self._arrived:
-            poured = attempt()
-            self._arrived[key] = -1 if poured.lost else poured.arrived
+            try:
+                poured = attempt()
+                self._arrived[key] = -1 if poured.lost or poured.code != EngineCode.OK else poured.arrived
+            except ControlError:
+                self._arrived[key] = -1
             if self._file is not None:
                 with self._file.open("a", encoding="utf-8") as file:
                     note = {"pour": method, "grasp": grasp, "turn": turn, "arrived": self._arrived[key]}

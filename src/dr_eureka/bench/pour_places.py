@@ -7,7 +7,7 @@ import numpy as np
 
 from dr_eureka.bench.pour_spread import Spread
 from dr_eureka.errors import DrEurekaError
-from dr_eureka.game.hands import HANDS
+from dr_eureka.game.state import TUBES
 from dr_eureka.kinematics.arms import base_from_camera
 from dr_eureka.pieces import Pieces
 from dr_eureka.simulation.camera_model import camera_model
@@ -37,14 +37,14 @@ def scattered(world: WorldSettings, spread: Spread) -> WorldSettings:
 
 
 def nominal_feet(world: WorldSettings) -> dict[str, np.ndarray]:
-    """Return the foot (3,) [m] in base of each hand's tube where the layout puts it."""
-    return {hand: np.array([*world.layout.tubes_in_sheet[hand], 0.0]) + world.layout.sheet_centre for hand in HANDS}
+    """Return the foot (3,) [m] in base of each tube, by its name, where the layout puts it."""
+    return {tube: np.array([*world.layout.tubes_in_sheet[tube], 0.0]) + world.layout.sheet_centre for tube in TUBES}
 
 
 def located_feet(
     world: WorldSettings, seed: int, pieces: Pieces, camera: CameraSettings, tubes: TubeSettings, stage: Stage
 ) -> dict[str, np.ndarray]:
-    """Return the foot (3,) [m] in base of each hand's tube as the robot's head sees it, hands out of the picture.
+    """Return the foot (3,) [m] in base of each tube as the robot's head sees it, hands out of the picture.
 
     A world of equal scatter and seed has its tubes in the same places. `stage`: one with a renderer. Raises PourPlacesError.
     """
@@ -55,4 +55,4 @@ def located_feet(
     scene = locate_tubes(watched.camera_image(), camera_model(camera), pose, pieces, tubes)
     if scene.result != TubeResult.OK:
         raise PourPlacesError(scene.result, scene.reason)
-    return {hand: scene.tubes[hand].position for hand in HANDS}
+    return {tube: scene.tubes[tube].position for tube in TUBES}

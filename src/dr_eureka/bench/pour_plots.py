@@ -16,6 +16,8 @@ from dr_eureka.bench.pour_rig import PourKind, PourRig
 from dr_eureka.bench.pour_rounds import CONTROL, Trial
 from dr_eureka.bench.pour_spread import NONE
 from dr_eureka.bench.report import share_row
+from dr_eureka.control.grasp import UP
+from dr_eureka.control.pour_geometry import PourPlace
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.kinematics.transforms import transform
 from dr_eureka.pieces import load_pieces
@@ -30,8 +32,8 @@ STRIPS = {
     "pour_lock": (PourKind("lock", "left", 4, 1, 1), (0.0, 0.4, 0.8, 1.3, 1.7, 2.0, 2.2)),
     "pour_profiled": (PourKind("profiled", "left", 4, 2, 0), (0.0, 0.1, 0.18, 0.26, 0.34, 0.42, 0.65)),
 }
-# Beside the tubes, level with the mouths, square to the plane in which they pour.
-WATCHED_M, WATCHER_M = np.array([0.45, 0.0, 1.05]), np.array([0.75, 0.18, 1.07])
+# [m] how far from the mouths the camera stands that looks from beside.
+_AWAY_M = 0.35
 
 
 def draw_plots(folder: Path, stated: Sequence[Trial], wide: Sequence[Trial]) -> None:
@@ -72,17 +74,17 @@ def draw_strips(folder: Path, seed: int) -> None:
     try:
         rig = PourRig(control, load_world_settings(), load_pieces(), NONE, seed, stage, camera)
         for name, (kind, times_s) in STRIPS.items():
-            _draw_strip(folder / f"{name}.png", rig, kind, times_s)
+            _draw_strip(folder / f"{name}.png", rig, kind, times_s, _beside(control.pour_place))
     finally:
         stage.close()
 
 
-def _draw_strip(file: Path, rig: PourRig, kind: PourKind, times_s: Sequence[float]) -> None:
+def _draw_strip(file: Path, rig: PourRig, kind: PourKind, times_s: Sequence[float], beside: np.ndarray) -> None:
     due, frames = list(times_s), []
 
     def watch(elapsed_s: float) -> None:
         if due and elapsed_s >= due[0] - 1e-6:
-            frames.append((due.pop(0), rig.world.camera_image(), rig.world.picture_from(_beside())))
+            frames.append((due.pop(0), rig.world.camera_image(), rig.world.picture_from(beside)))
 
     poured = rig.pour(kind, each_cycle=watch)
     figure, axes = plt.subplots(2, len(frames), figsize=(2.2 * len(frames), 4.6), squeeze=False)
@@ -101,9 +103,8 @@ def _draw_strip(file: Path, rig: PourRig, kind: PourKind, times_s: Sequence[floa
     plt.close(figure)
 
 
-def _beside() -> np.ndarray:
-    """Return base_from_camera (4, 4) of a level camera beside the tubes."""
-    forward = (WATCHED_M - WATCHER_M) / np.linalg.norm(WATCHED_M - WATCHER_M)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    return transform(np.column_stack([right, np.cross(forward, right), forward]), WATCHER_M)
+def _beside(place: PourPlace) -> np.ndarray:
+    """Return base_from_camera (4, 4) of a level camera before the robot that looks square on the plane in which it pours."""
+    right = np.array([np.cos(place.plane_yaw), -np.sin(place.plane_yaw), 0.0])
+    forward = np.cross(right, UP)
+    return transform(np.column_stack([right, -UP, forward]), np.array(place.target_mouth) - _AWAY_M * forward)

@@ -51,11 +51,15 @@ class PourKind:
 
 @dataclass(frozen=True)
 class Poured:
-    """What became of it: balls that arrived, balls in neither tube, robot time from ready to ready [s]."""
+    """What became of it: balls that arrived, balls in neither tube, robot time from ready to ready [s].
+
+    `code`: OK, or why the engine broke it off.
+    """
 
     arrived: int
     lost: int
     seconds: float
+    code: str = EngineCode.OK
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,8 @@ class _Moment:
 class PourRig:
     """One grasp of both tubes, drawn from a seed, and pours from there; raises ControlError when the grasp itself fails.
 
-    `feet`: by hand, where the robot believes that the tubes stand (3,) [m] in base; by default their nominal places.
+    `feet`: by tube, where the robot believes that it stands (3,) [m] in base, by default its nominal place. Each hand takes the
+    tube of its side.
     Source: the trials of paper 4.4, Table 2.
     """
 
@@ -89,7 +94,7 @@ class PourRig:
         self.world = World(self._laid_out(world, feet), seed, START_OF_TRIALS, pieces=pieces, camera=camera, stage=stage)
         joints = self.world.joint_positions()
         self.body.goals = {name: joints[name] for name in CONTROLLED_JOINTS}
-        self.body.joints, self.body.places = joints, {"center": self.world.tube_pose("center")[:3, 3]}
+        self.body.joints, self.body.places = joints, {"center": feet["center"]}
         self._limiter = self._fresh_limiter()
         self._run(self._grasp(feet))
         self._lifted = self._moment()
@@ -99,8 +104,8 @@ class PourRig:
         """Return a world with the open fingers round where the tubes are believed to stand, `feet` (3,) [m]."""
         pick, grip = self._control.pick, self._control.grip
         start = {"head_p": 0.42}
-        for hand, foot in feet.items():
-            arm = self.body.arms[hand]
+        for hand in HANDS:
+            arm, foot = self.body.arms[hand], feet[hand]
             yaw = pick.approach_yaw if hand == "left" else -pick.approach_yaw
             pose = level_hand(foot + pick.grip_height * UP, yaw, pick.centre_beyond_end)
             rest = arm.posture(self._control.postures.pick)
@@ -143,21 +148,24 @@ class PourRig:
     ) -> Poured:
         """Pour once from the ready pose of that kind and count, with the rig's own or other settings.
 
-        `each_cycle` gets the time since the pour began [s] in each control cycle. Raises ControlError.
+        `each_cycle` gets the time since the pour began [s] in each control cycle. Raises ControlError where the tubes do not even
+        come to the ready pose.
         """
         self.body.settings = settings or self._control
         target_hand = next(hand for hand in HANDS if hand != kind.hand)
         self._make_ready(kind, target_hand)
         self._fill({kind.hand: kind.held, target_hand: kind.in_target})
         skill = pour(self.body, kind.hand, target_hand, kind.method, kind.held, kind.count)
-        began = self.world.time_s
-        self._run(skill, each_cycle)
+        began, code = self.world.time_s, EngineCode.OK
+        try:
+            self._run(skill, each_cycle)
+        except ControlError as error:
+            code = error.code
         seconds = self.world.time_s - began
         self._wait(SETTLE_S)
         held = {hand: len(self.world.referee().tubes[hand]) for hand in HANDS}
         lost = kind.held + kind.in_target - sum(held.values())
-        self.body.settings = self._control
-        return Poured(held[target_hand] - kind.in_target, lost, seconds)
+        return Poured(held[target_hand] - kind.in_target, lost, seconds, code)
 
     def _make_ready(self, kind: PourKind, target_hand: str) -> None:
         """Go back to when the tubes came to the ready pose, or bring them there for the first time."""

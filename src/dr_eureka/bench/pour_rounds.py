@@ -16,7 +16,7 @@ from dr_eureka.bench.pour_places import PourPlacesError, located_feet, scattered
 from dr_eureka.bench.pour_rig import PourKind, PourRig
 from dr_eureka.bench.pour_spread import Spread, mistimed
 from dr_eureka.bench.workers import shared_out
-from dr_eureka.control.codes import ControlError
+from dr_eureka.control.codes import ControlError, EngineCode
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.game.hands import HANDS
 from dr_eureka.game.state import BALLS_PER_COLOUR, COLOURS, TUBE_CAPACITY
@@ -32,10 +32,9 @@ BALLS = BALLS_PER_COLOUR * len(COLOURS)
 
 @dataclass(frozen=True)
 class Trial:
-    """A pour that was tried: how far off [rad] the tube that was poured from sat in the hand, and what became of it.
+    """A pour that was tried: how far off [rad] the tube that was poured from was put in the hand, and what became of it.
 
-    Without `arrived` it was refused, or the grasp before it, or the tubes were not located: `code` is the engine's or one of
-    TubeResult.
+    `code`: the engine's, or one of TubeResult where the tubes were not located. Without `arrived` it did not begin.
     """
 
     kind: PourKind
@@ -47,8 +46,8 @@ class Trial:
 
     @property
     def right(self) -> bool:
-        """Whether just as many balls arrived as were meant to, and none was lost."""
-        return self.arrived == self.kind.count and self.lost == 0
+        """Whether it was carried out, just as many balls arrived as were meant to, and none was lost."""
+        return self.code == EngineCode.OK and self.arrived == self.kind.count and self.lost == 0
 
 
 def lock_kinds() -> list[PourKind]:
@@ -126,11 +125,11 @@ def _round(spread: Spread, seed: int, kinds_of: Callable[[int], list[PourKind]],
         return [Trial(kind, 0.0, error.code) for kind in kinds]
     trials = []
     for kind in kinds:
-        settings = mistimed(bench.control, spread, rng)
+        settings = mistimed(bench.control, spread, rng, kind.held, kind.count)
         try:
             poured = rig.pour(kind, settings)
         except ControlError as error:
             trials.append(Trial(kind, rig.tilts[kind.hand], error.code))
         else:
-            trials.append(Trial(kind, rig.tilts[kind.hand], "OK", poured.arrived, poured.lost, poured.seconds))
+            trials.append(Trial(kind, rig.tilts[kind.hand], poured.code, poured.arrived, poured.lost, poured.seconds))
     return trials

@@ -13,7 +13,7 @@ from dr_eureka.control.settings import ControlSettings
 class Spread:
     """How far things are off in each trial, evenly drawn between minus and plus these.
 
-    materials: share of friction and of bounce; placement: where a tube stands to its nominal place, x and y [m], from where
+    materials: share of friction and of bounce of ball on tube; placement: where a tube stands to its nominal place, x and y [m], from where
     the robot's camera locates it; grasp and tilt: how a tube sits in the hand to how it is believed to, along [m] and about
     [rad] the tube's axes, which nothing tells the robot; timing: of each stretch of a pour [s].
     """
@@ -30,15 +30,17 @@ STATED = Spread(materials=0.20, placement=0.003, grasp=0.001, tilt=radians(1.0),
 WIDE = Spread(materials=0.50, placement=0.003, grasp=0.002, tilt=radians(2.0), timing=0.002)
 
 
-def mistimed(settings: ControlSettings, spread: Spread, rng: np.random.Generator) -> ControlSettings:
-    """Return settings whose pours last a little longer or shorter: each keyframe of the lock, the way down of the others."""
+def mistimed(settings: ControlSettings, spread: Spread, rng: np.random.Generator, held: int, count: int) -> ControlSettings:
+    """Return settings whose pours of `count` out of `held` balls are timed a little otherwise.
+
+    Of the lock it is how long each keyframe lasts, of the others when they turn back.
+    """
     def late() -> float:
         return float(rng.uniform(-spread.timing, spread.timing))
 
     lock, linear, profiled = settings.lock_pour, settings.linear_pour, settings.profiled_pour
     keyframes = tuple(replace(frame, seconds=frame.seconds + late()) for frame in lock.keyframes)
-    # Some 150 steps lead down.
-    step = linear.step_seconds + late() / 150.0
+    step = linear.step_seconds + late() / linear.return_steps[held][count]
     shift = late()
     dips = {staying: seconds + shift for staying, seconds in profiled.dip_seconds.items()}
     return replace(

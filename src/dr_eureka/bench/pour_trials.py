@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from dr_eureka.game.state import TUBE_CAPACITY
 from dr_eureka.settings import build
 
 _BALLS = {"min": 0, "max": TUBE_CAPACITY}
+_WRONG = ("fewer", "more", "lost")
 
 
 class PourTrialError(DrEurekaError):
@@ -77,13 +78,38 @@ def _trial(line: str, where: str) -> PourTrial:
 def shares(trials: Iterable[PourTrial]) -> dict[Key, Figure]:
     """Return the share of each ending and the number of trials, by the place in config/planner.yaml.
 
-    Shares are rounded to 0.0001, the intended ones so that all add up to 1; an ending that was never seen is not named.
+    Shares are rounded to 0.0001, the intended ones so that all add up to 1; an ending that was never seen is not named. A lock-pour
+    of several balls is one of single balls after the other: where it was not tried, it ends as they do.
     """
     endings: dict[Key, Counter[str]] = defaultdict(Counter)
     for trial in trials:
         endings["outcomes", trial.pour, trial.held, trial.count][trial.ending] += 1
     figures = {}
     for key, seen in endings.items():
-        wrong = {name: round(seen[name] / seen.total(), 4) for name in ("fewer", "more", "lost") if seen[name]}
-        figures[key] = {"intended": round(1.0 - sum(wrong.values()), 4), **wrong, "trials": seen.total()}
+        figures[key] = _figure({name: seen[name] / seen.total() for name in _WRONG}, seen.total())
+    for held in range(2, TUBE_CAPACITY + 1):
+        for count in range(2, held + 1):
+            key = "outcomes", "lock", held, count
+            single = [figures.get(("outcomes", "lock", held - poured, 1)) for poured in range(count)]
+            if key not in figures and all(single):
+                figures[key] = _in_a_row(single, empties=count == held)
     return figures
+
+
+def _figure(wrong: Mapping[str, float], trials: int) -> Figure:
+    """Return the shares of endings, given those of the wrong ones."""
+    named = {name: round(share, 4) for name, share in wrong.items() if round(share, 4)}
+    return {"intended": round(1.0 - sum(named.values()), 4), **named, "trials": trials}
+
+
+def _in_a_row(pours: Sequence[Figure], empties: bool) -> Figure:
+    """Return how pours in a row end: as intended when all do, else as the first that does not.
+
+    In a row that empties the tube, a ball too many comes early and not too many in the end.
+    """
+    well, wrong = 1.0, dict.fromkeys(("fewer", "lost") if empties else _WRONG, 0.0)
+    for pour in pours:
+        for name in wrong:
+            wrong[name] += well * pour.get(name, 0.0)
+        well *= pour["intended"]
+    return _figure(wrong, min(pour["trials"] for pour in pours))

@@ -5,6 +5,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Optional
 
@@ -21,7 +22,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     arguments = _parser().parse_args(argv)
     # Bullet takes a second to import: only once the arguments are known to be good
     from dr_eureka.bench.planner_file import rewrite
-    from dr_eureka.bench.pour_calibration import Notes, search, told
+    from dr_eureka.bench.pour_calibration import NO_TURNS, Notes, search, told
     from dr_eureka.bench.pour_rig import PourRig
     from dr_eureka.bench.pour_spread import STATED
     from dr_eureka.control.settings import ControlSettings
@@ -36,7 +37,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         def make_rig(grasp: int) -> PourRig:
             return PourRig(control, world, pieces, spread, _FIRST_WORLD + 1000 * arguments.seed + grasp, stage)
 
-        turns = search(make_rig, control, arguments.grasps, Notes(arguments.notes))
+        # All that an outcome depends on, but for the turns, which are what is searched for.
+        same = repr((told(control, NO_TURNS), world, pieces, spread, arguments.seed))
+        notes = Notes(arguments.notes, sha256(same.encode()).hexdigest())
+        turns = search(make_rig, control, arguments.grasps, notes)
         for method, by_staying in turns.items():
             for staying, turn in by_staying.items():
                 what = "ms" if method == "profiled" else "steps"

@@ -146,7 +146,8 @@ class ControlEngine:
 
     def go_on(self, put_down: bool) -> None:
         """End a pause: carry the strategy on, or leave it and put down what is held; raise ControlError (INVALID_ACTION)."""
-        if not self.status.paused:
+        # The pause may have just timed out, with the next motion being planned.
+        if not (self.status.paused and self._script.paused):
             raise ControlError(EngineCode.INVALID_ACTION, f"no pour waits to be looked at: {self.status.message}")
         self._script.paused, self._script.put_down = False, put_down
         self.status = replace(self.status, paused=False)

@@ -16,7 +16,9 @@ from dr_eureka.game.hands import HANDS
 
 
 def raise_tubes(body: Body) -> Iterator[Motion]:
-    """Bring both held tubes from a pour's ready pose back to upright, side by side."""
+    """Bring both held tubes from a pour's ready pose back to upright, side by side; nothing to do when they are."""
+    if not body.upright:
+        return
     if body.pour_ready is not None and all(hand in body.held for hand in HANDS):
         planner = PourPlanner(body, *body.pour_ready)
         points = np.vstack([body.commanded(planner.source.hand), planner.docking[-2::-1]])

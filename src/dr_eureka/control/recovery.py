@@ -29,8 +29,7 @@ def put_all_down(body: Body, homes: Mapping[str, np.ndarray]) -> Iterator[Motion
         yield Wait(settled((grip_joint(hand),)), body.settings.grip.settle_seconds)
         if _is_low(body, hand):
             yield vertical(body, hand, body.settings.pick.lift, body.settings.speeds.move, "the way up")
-    if body.upright:
-        yield from raise_tubes(body)
+    yield from raise_tubes(body)
     for hand, held in tuple(body.held.items()):
         yield from place(body, hand, held.tube, homes[held.tube])
     yield from go_home(body)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Mapping, Sequence
 
 from dr_eureka.control.pour_geometry import LipPlace, PourPlace
 from dr_eureka.control.trajectory import MotionLimits
+from dr_eureka.game.state import TUBE_CAPACITY
 from dr_eureka.kinematics.hybrid import HybridSettings
-from dr_eureka.settings import build
+from dr_eureka.settings import SettingsError, build
 
 _POSITIVE = {"min": 1e-6}
 
@@ -106,7 +108,7 @@ class LinearPourSettings:
     poses: int = field(metadata={"min": 1, "max": 10000})
     step_seconds: float = field(metadata=_POSITIVE)
     limits: TiltLimits
-    return_steps: dict[int, dict[int, int]]
+    return_steps: dict[int, dict[int, int]] = field(metadata={"min": 1})
 
 
 @dataclass(frozen=True)
@@ -180,4 +182,17 @@ class ControlSettings:
     @classmethod
     def from_mapping(cls, mapping: dict, where: str) -> ControlSettings:
         """Validate the yaml's content (its `node:` block is the ROS node's own); raises SettingsError."""
-        return build(cls, {key: value for key, value in mapping.items() if key != "node"}, where)
+        settings = build(cls, {key: value for key, value in mapping.items() if key != "node"}, where)
+        numbers = range(1, TUBE_CAPACITY + 1)
+        _check_keys(settings.profiled_pour.dip_seconds, range(TUBE_CAPACITY), where, "profiled_pour.dip_seconds")
+        _check_keys(settings.linear_pour.return_steps, numbers, where, "linear_pour.return_steps")
+        for held, steps in settings.linear_pour.return_steps.items():
+            _check_keys(steps, range(1, held + 1), where, f"linear_pour.return_steps.{held}")
+        return settings
+
+
+def _check_keys(table: Mapping[int, object], needed: Sequence[int], where: str, key: str) -> None:
+    """Raise SettingsError unless a table tells of each number of balls that there may be, and of no other."""
+    if set(table) != set(needed):
+        told, numbers = (", ".join(map(str, sorted(keys))) for keys in (table, needed))
+        raise SettingsError(where, key, f"has the keys {told}", f"the keys {numbers}", table)

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import tempfile
 from functools import lru_cache
+from math import sqrt
 from pathlib import Path
 from typing import Sequence
 
@@ -45,7 +46,7 @@ class BodyMaker:
     """Makes one world's bodies.
 
     Args:
-        friction, restitution: factors of this world's materials on the settings' values.
+        friction, restitution: factors of this world's materials: by how much ball on tube differs from the settings' product.
         wall_tint: 0..1, how much of a tube's wall one sees.
     """
 
@@ -54,8 +55,9 @@ class BodyMaker:
         self._client = client
         self._physics = physics
         self._pieces = pieces
-        self._friction = friction
-        self._restitution = restitution
+        # Bullet multiplies the values of two touching bodies: so the product for two pieces varies by just these factors.
+        self._friction = sqrt(friction)
+        self._restitution = sqrt(restitution)
         self._tube_com, _ = mass_properties(pieces, physics.tube_mass)
         self._tube_file = scratch_folder() / "tube.urdf"
         write_tube_urdf(self._tube_file, pieces, physics.tube_mass, physics.wall_boxes, wall_tint)

@@ -13,7 +13,7 @@ from dr_eureka.simulation.joints import ALL_JOINTS
 from dr_eureka.simulation.settings import SimulationError
 from dr_eureka.simulation.world import World
 
-# A tube whose axis is this near the horizontal is being poured from; the receiving one leans by 20 degrees only.
+# A tube whose axis is this near the horizontal is being poured from; the receiving one leans by 35 degrees only.
 POURING_ELEVATION = math.radians(30.0)
 # A jog comes and goes in this time [s]: the arm is pushed, not struck.
 RAMP_SECONDS = 0.2
