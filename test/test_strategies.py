@@ -42,6 +42,14 @@ def every_failure_is_final():
     return replace(SETTINGS, outcomes={"lock": SETTINGS.outcomes["lock"], "linear": table})
 
 
+def every_pour_may_end_otherwise():
+    def outcome(held, count):
+        return Outcome(0.92, fewer=0.04, lost=0.04) if count == held else Outcome(0.92, fewer=0.03, more=0.03, lost=0.02)
+
+    table = {held: {count: outcome(held, count) for count in range(1, held + 1)} for held in range(1, 5)}
+    return replace(SETTINGS, outcomes={**SETTINGS.outcomes, "linear": table})
+
+
 def solve_for(goals, settings, method="linear", uncertain=True):
     """Solve for some goals only, which takes a moment where all of them take seconds."""
     graph = replace(state_graph(), representatives=np.array([state_graph().numbers[goal.tubes] for goal in goals]))
@@ -121,7 +129,7 @@ def play(planner, state, goal, chance):
 
 def test_games_by_the_surest_plan_are_solved_as_often_as_it_says(planner_for):
     goal, games, chance = State.parse("GR|PG|RP"), 2000, random.Random(8)
-    planner = planner_for(goal, "surest", "linear")
+    planner = planner_for(goal, "surest", "linear", settings=every_pour_may_end_otherwise())
     plan = planner.plan(START, goal)
     ends = [play(planner, START, goal, chance) for _ in range(games)]
     solved = sum(state == goal for state, _ in ends) / games
@@ -140,9 +148,8 @@ def test_what_to_pour_next_follows_the_plan_and_ends_at_the_goal():
 
 
 def test_a_pour_may_end_one_ball_short_or_one_ball_over_or_beside_the_tubes(planner_for):
-    outcome = Outcome(0.9, fewer=0.04, more=0.04, lost=0.02)
-    linear = {**SETTINGS.outcomes["linear"], 4: {count: outcome for count in (1, 2, 3, 4)}}
-    settings = replace(SETTINGS, outcomes={**SETTINGS.outcomes, "linear": linear})
+    settings = every_pour_may_end_otherwise()
+    outcome = settings.outcomes["linear"][4][2]
     planner = planner_for(START, "surest", "linear", settings=settings)
     results = planner.results_of(Pour("left", "right", 2), State.parse("RRGG|PP|"), START)
     assert {None if r.state is None else str(r.state): r.share for r in results} == {

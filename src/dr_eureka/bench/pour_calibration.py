@@ -30,6 +30,8 @@ TURNS = {
 NO_TURNS: Mapping[str, Mapping[int, int]] = {method: {} for method in TURNS}
 # A turn is judged with its neighbours, as a pour may be timed a little wrongly.
 _WEIGHTS = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
+# So many turns of the grid later than need be all balls are given to pass: for grasps that are worse than any that was tried.
+_ROOM = 2
 
 
 class PourCalibrationError(DrEurekaError):
@@ -109,7 +111,7 @@ def best_turns(method: str, turns: Sequence[int], arrived: np.ndarray) -> dict[i
     """Return when to turn back by how many balls stay behind, of a full tube; raises PourCalibrationError.
 
     `arrived` (k, n): how many balls passed at each of k turns with each of n grasps, -1 where one was lost. Of equally good
-    turns in a row it is the middle one; the first one where all balls shall pass, as turning later only takes longer.
+    turns in a row it is the middle one; where all balls shall pass, one soon after the first, as turning later only takes longer.
     """
     found = {}
     for staying in range(TUBE_CAPACITY):
@@ -121,7 +123,7 @@ def best_turns(method: str, turns: Sequence[int], arrived: np.ndarray) -> dict[i
         first = last = int(np.argmax(judged))
         while last + 1 < len(judged) and judged[last + 1] >= judged[first] - 1e-9:
             last += 1
-        best = first if staying == 0 else (first + last) // 2
+        best = min(first + _ROOM, last) if staying == 0 else (first + last) // 2
         found[staying] = Turn(turns[best], float(shares[best]))
     return found
 
