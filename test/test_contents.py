@@ -141,6 +141,15 @@ def test_a_held_tube_is_read_where_the_joints_say_it_is():
     assert reading.result == ContentsResult.UNSURE
 
 
+def test_low_down_in_a_hand_nothing_is_taken_for_empty_however_bright_the_hand_is():
+    scene = Scene(balls=("RR", "GP", "GP"))
+    pose = np.eye(4)
+    pose[:3, 3] = scene.tubes_in_base[0]
+    reading = look_at(covered(scene, "left", 0.0, 0.047, colour=(140, 142, 146)), scene, {"left": pose})
+    assert reading.tubes["left"].colours == "??"
+    assert look_at(draw(scene, PIECES, CAMERA), scene, {"left": pose}).tubes["left"].colours == "RR"
+
+
 def test_a_tube_of_which_nothing_is_known_is_unsure():
     scene = Scene(balls=("RR", "GG", "PP"))
     places = places_of(scene.tubes_in_base)

@@ -32,6 +32,7 @@ class ContentsSettings:
     smallest_resemblance: float = field(metadata={"min": -1.0, "max": 1.0})
     darkest_paper: float = field(metadata={"min": 0.0, "max": 1.0})
     darkest_held: float = field(metadata={"min": 0.0, "max": 255.0})
+    lowest_held_m: float = field(metadata={"min": 0.0, "max": 0.2})
     darkest_ball: float = field(metadata={"min": 0.0, "max": 255.0})
     loose_margin_m: float = field(metadata={"min": 0.0, "max": 0.5})
 
@@ -59,8 +60,8 @@ class TubeView:
         self._camera_from_tube = np.linalg.inv(base_from_camera) @ base_from_tube
         self._pieces = pieces
         self.distance = float(np.linalg.norm(self._camera_from_tube[:3, 3]))
-        heights = pieces.tube_floor + pieces.ball_radius + pieces.ball_diameter * np.arange(TUBE_CAPACITY)
-        points = np.outer(heights, [0.0, 0.0, 1.0])
+        self.heights = pieces.tube_floor + pieces.ball_radius + pieces.ball_diameter * np.arange(TUBE_CAPACITY)
+        points = np.outer(self.heights, [0.0, 0.0, 1.0])
         self.centres = self._project(points)
         self.radii = camera.matrix[0, 0] * pieces.ball_radius / self._in_camera(points)[:, 2]
 
@@ -114,12 +115,14 @@ class LevelReader:
     def read(self, view: TubeView, standing: bool) -> tuple[Level, ...]:
         """Read a tube's levels, bottom to top, and remember that it hides what is behind it.
 
-        A tube that is held may be hidden by the hand, of which only the darkness tells; before paper, a standing one's too.
+        A tube that is held may be hidden by the hand: low down in any case, higher up where it is dark. A standing one is hidden by
+        what is dark before paper.
         """
         if len(view.base_outline):
             # Through an empty tube its own tape is seen, not the paper behind that.
             cv2.fillConvexPoly(self._paper, view.base_outline, 0)
-        levels = tuple(self._level(centre, radius, standing) for centre, radius in zip(view.centres, view.radii))
+        places = zip(view.centres, view.radii, view.heights)
+        levels = tuple(self._level(centre, radius, None if standing else height) for centre, radius, height in places)
         for level, centre, radius in zip(levels, view.centres, view.radii):
             if level.label != EMPTY and np.isfinite(centre).all():
                 cv2.circle(self._hidden, np.rint(centre).astype(int).tolist(), round(radius), 1, -1)
@@ -128,7 +131,8 @@ class LevelReader:
                 cv2.fillConvexPoly(mask, outline, 1)
         return levels
 
-    def _level(self, centre: np.ndarray, radius: float, standing: bool) -> Level:
+    def _level(self, centre: np.ndarray, radius: float, height_held: float | None) -> Level:
+        """Read a disc [px]; `height_held` [m]: how far above the foot it is, of a tube that is held."""
         pixels, wanted = _disc(centre, radius * self._settings.sample_share, self._image.shape)
         in_view = pixels[self._hidden[pixels[:, 0], pixels[:, 1]] == 0]
         if len(in_view) < self._settings.smallest_seen_share * wanted:
@@ -139,10 +143,11 @@ class LevelReader:
         level = self._classify(rgb, self._settings.wall_transmission if behind_wall else 1.0)
         if level.label != EMPTY:
             return level
-        if standing:
+        if height_held is None:
             before_paper = self._paper[rows, columns].mean() > 0.8
             return _NOT_KNOWN if before_paper and rgb.max() < self._settings.darkest_paper * self._white else level
-        return _NOT_KNOWN if rgb.max() < self._settings.darkest_held else level
+        in_hand = height_held < self._settings.lowest_held_m or rgb.max() < self._settings.darkest_held
+        return _NOT_KNOWN if in_hand else level
 
     def _classify(self, rgb: np.ndarray, transmission: float) -> Level:
         """Name what a colour is, seen through its tube's own wall and `transmission` (0..1) of what else is in front.
