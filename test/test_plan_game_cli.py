@@ -3,6 +3,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from dr_eureka.cli.plan_game import main
 from dr_eureka.game.actions import actions_for
 from dr_eureka.game.planner import Planner, plan_pours
+from dr_eureka.game.planner_settings import Outcome, load_planner_settings
 from dr_eureka.game.state import START, Pour, State
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -106,7 +108,21 @@ def test_the_fastest_plan_pours_several_balls_at_once(capsys):
     assert (plan["strategy"], plan["unit"], plan["cost"]) == ("fastest", "s", plan["seconds"])
 
 
-def test_the_surest_plan_says_what_to_do_when_a_pour_goes_wrong(capsys):
+@pytest.fixture
+def pours_that_may_go_wrong(monkeypatch, tmp_path):
+    """Plans are made as if every linear pour might end otherwise than intended, whatever the trials said."""
+    settings = load_planner_settings()
+
+    def outcome(held, count):
+        return Outcome(0.95, fewer=0.03, lost=0.02) if count == held else Outcome(0.95, fewer=0.02, more=0.02, lost=0.01)
+
+    linear = {held: {count: outcome(held, count) for count in range(1, held + 1)} for held in range(1, 5)}
+    changed = replace(settings, outcomes={**settings.outcomes, "linear": linear})
+    monkeypatch.setattr("dr_eureka.game.planner.load_planner_settings", lambda: changed)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def test_the_surest_plan_says_what_to_do_when_a_pour_goes_wrong(capsys, pours_that_may_go_wrong):
     arguments = ["RRP|PG|G", "--strategy", "surest", "--pour", "linear"]
     assert main([*arguments, "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
