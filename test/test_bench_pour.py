@@ -5,6 +5,7 @@ import pytest
 
 from dr_eureka.bench.pour import TABLE_2, as_pour_trials, rows_of, wide_rows
 from dr_eureka.bench.pour_places import located_feet, nominal_feet, scattered
+from dr_eureka.bench.pour_plots import _beside
 from dr_eureka.bench.pour_rig import PourKind, PourRig
 from dr_eureka.bench.pour_rounds import CONTROL, Trial, direct_kinds, fewer_kinds, lock_kinds
 from dr_eureka.bench.pour_spread import NONE, STATED, mistimed
@@ -59,6 +60,15 @@ def test_tubes_that_stand_beside_their_places_are_located_by_the_robots_camera()
         beside = np.abs(true[hand] - nominal[hand])[:2]
         assert beside.max() <= STATED.placement and beside.max() > 0.0015
         assert np.linalg.norm(seen[hand] - true[hand]) < 0.0015
+
+
+def test_the_camera_beside_stands_level_before_the_robot_square_to_the_pour():
+    pose, place = _beside(SETTINGS.pour_place), SETTINGS.pour_place
+    assert np.linalg.det(pose[:3, :3]) == pytest.approx(1.0)
+    pours_towards = np.array([np.cos(place.plane_yaw), -np.sin(place.plane_yaw), 0.0])
+    assert pose[:3, :3].T @ pours_towards == pytest.approx([-1.0, 0.0, 0.0])
+    mouth = np.linalg.inv(pose) @ [*place.target_mouth, 1.0]
+    assert mouth == pytest.approx([0.0, 0.0, 0.35, 1.0]) and pose[0, 3] > place.target_mouth[0] + 0.3
 
 
 def test_rows_count_what_went_right_beside_the_paper():

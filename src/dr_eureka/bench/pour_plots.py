@@ -30,7 +30,7 @@ TILT_EDGES_DEG = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
 # Since the pour began [s].
 STRIPS = {
     "pour_lock": (PourKind("lock", "left", 4, 1, 1), (0.0, 0.4, 0.8, 1.3, 1.7, 2.0, 2.2)),
-    "pour_profiled": (PourKind("profiled", "left", 4, 2, 0), (0.0, 0.1, 0.18, 0.26, 0.34, 0.42, 0.65)),
+    "pour_profiled": (PourKind("profiled", "left", 4, 2, 0), (0.0, 0.1, 0.18, 0.26, 0.34, 0.42, 0.6)),
 }
 # [m] how far from the mouths the camera stands that looks from beside.
 _AWAY_M = 0.35
@@ -105,6 +105,6 @@ def _draw_strip(file: Path, rig: PourRig, kind: PourKind, times_s: Sequence[floa
 
 def _beside(place: PourPlace) -> np.ndarray:
     """Return base_from_camera (4, 4) of a level camera before the robot that looks square on the plane in which it pours."""
-    right = np.array([np.cos(place.plane_yaw), -np.sin(place.plane_yaw), 0.0])
-    forward = np.cross(right, UP)
+    right = np.array([-np.cos(place.plane_yaw), np.sin(place.plane_yaw), 0.0])
+    forward = np.cross(UP, right)
     return transform(np.column_stack([right, -UP, forward]), np.array(place.target_mouth) - _AWAY_M * forward)
