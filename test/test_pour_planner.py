@@ -13,7 +13,7 @@ from dr_eureka.control.port import CONTROLLED_JOINTS
 from dr_eureka.control.pour_planner import PourPlanner
 from dr_eureka.control.pouring import pour
 from dr_eureka.control.settings import ControlSettings
-from dr_eureka.game.hands import HANDS
+from dr_eureka.game.hands import HANDS, other_hand
 from dr_eureka.kinematics.arms import arm_joint_names
 from dr_eureka.kinematics.transforms import invert, rotation_about, rotation_vector, transform
 from dr_eureka.pieces import load_pieces
@@ -53,7 +53,7 @@ def holding(settings: ControlSettings, held_from_believed: np.ndarray = np.eye(4
 
 def tubes_on_the_way(body: Body, source: str, method: str, samples: int = 40) -> tuple[np.ndarray, np.ndarray]:
     """Return base_from_tube (samples, 4, 4) of source and target in a pour of 1 or 2 out of 4, by forward kinematics."""
-    target = next(hand for hand in HANDS if hand != source)
+    target = other_hand(source)
     for motion in pour(body, source, target, method, 4, 1 if method == "lock" else 2):
         assert body.hit(motion) is None
         times = np.linspace(0.0, motion.duration, samples)

@@ -23,7 +23,7 @@ from dr_eureka.control.port import CONTROLLED_JOINTS, grip_joint
 from dr_eureka.control.pouring import pour
 from dr_eureka.control.settings import ControlSettings
 from dr_eureka.control.trajectory import JointTrajectory
-from dr_eureka.game.hands import HANDS
+from dr_eureka.game.hands import HANDS, other_hand
 from dr_eureka.game.state import State
 from dr_eureka.kinematics.transforms import rotation_about, transform
 from dr_eureka.pieces import Pieces
@@ -152,7 +152,7 @@ class PourRig:
         come to the ready pose.
         """
         self.body.settings = settings or self._control
-        target_hand = next(hand for hand in HANDS if hand != kind.hand)
+        target_hand = other_hand(kind.hand)
         self._make_ready(kind, target_hand)
         self._fill({kind.hand: kind.held, target_hand: kind.in_target})
         skill = pour(self.body, kind.hand, target_hand, kind.method, kind.held, kind.count)

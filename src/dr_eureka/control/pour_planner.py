@@ -19,7 +19,7 @@ from dr_eureka.control.pour_geometry import PourGeometry
 from dr_eureka.control.pour_tilt import Tilt, linear_tilt, profiled_tilt
 from dr_eureka.control.settings import ControlSettings, LinearPourSettings, LockPourSettings, ProfiledPourSettings
 from dr_eureka.control.trajectory import JointTrajectory, SampledTrajectory, TrajectorySequence
-from dr_eureka.game.hands import HANDS
+from dr_eureka.game.hands import other_hand
 from dr_eureka.kinematics.arms import mirror_transform
 
 # Poses per keyframe: joint angles between them follow a cubic spline, which is then within 0.1 mm of the exact lip.
@@ -60,7 +60,7 @@ class PourPlanner:
 
     def __init__(self, body: Body, source_hand: str, method: str):
         self.settings = pour_settings(body.settings, method)
-        target_hand = next(hand for hand in HANDS if hand != source_hand)
+        target_hand = other_hand(source_hand)
         self.source, self.target = body.arms[source_hand], body.arms[target_hand]
         # The pour's own geometry keeps the lips apart by less than any margin.
         self.lips = frozenset({frozenset(tube_body(held.tube) for held in body.held.values())})

@@ -13,6 +13,11 @@ HANDS = ("left", "right")
 Reach = Mapping[str, tuple[str, ...]]
 
 
+def other_hand(hand: str) -> str:
+    """Return the hand that is not this one."""
+    return HANDS[1 - HANDS.index(hand)]
+
+
 class ReachError(DrEurekaError):
     """Something to pour between tubes that no pair of hands can take.
 
