@@ -41,7 +41,7 @@ def holding(settings: ControlSettings, held_from_believed: np.ndarray = np.eye(4
     pick = settings.pick
     for hand, y in zip(HANDS, (0.11, -0.11)):
         arm, foot = body.arms[hand], np.array([0.44, y, 0.775]) + pick.lift * UP
-        yaw = pick.approach_yaw if hand == "left" else -pick.approach_yaw
+        yaw = pick.yaw_of(hand)
         rest = arm.posture(settings.postures.pick)
         pose = level_hand(foot + pick.grip_height * UP, yaw, pick.centre_beyond_end)
         body.goals.update(zip(arm.joints, arm.solve(rest, pose, "", "the lifted tube", rest).tolist()))

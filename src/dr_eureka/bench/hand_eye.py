@@ -156,7 +156,7 @@ def _grasp(
     pick = bench.control.pick
     distances, tilts, held = [], [], {}
     for hand, arm in arms.items():
-        yaw = pick.approach_yaw if hand == "left" else -pick.approach_yaw
+        yaw = pick.yaw_of(hand)
         rest = arm.posture(bench.control.postures.pick)
         for tube in sorted(load_planner_settings().reach[hand], key=lambda name: name != "center"):
             centre = believed[tube] + pick.grip_height * UP

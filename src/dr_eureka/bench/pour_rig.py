@@ -106,7 +106,7 @@ class PourRig:
         start = {"head_p": 0.42}
         for hand in HANDS:
             arm, foot = self.body.arms[hand], feet[hand]
-            yaw = pick.approach_yaw if hand == "left" else -pick.approach_yaw
+            yaw = pick.yaw_of(hand)
             pose = level_hand(foot + pick.grip_height * UP, yaw, pick.centre_beyond_end)
             rest = arm.posture(self._control.postures.pick)
             angles = arm.solve(rest, pose, EngineCode.UNREACHABLE_TUBE, f"the {hand} tube", rest)

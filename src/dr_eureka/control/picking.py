@@ -16,11 +16,6 @@ from dr_eureka.control.trajectory import JointTrajectory, MotionLimits
 from dr_eureka.game.planner_settings import load_planner_settings
 
 
-def _approach_yaw(body: Body, hand: str) -> float:
-    yaw = body.settings.pick.approach_yaw
-    return yaw if hand == "left" else -yaw
-
-
 def fingers(body: Body, hand: str, angle: float) -> tuple[tuple[str], JointTrajectory]:
     """Return the track of a `Follow` that brings a hand's fingers to an angle [rad]."""
     joint = grip_joint(hand)
@@ -86,7 +81,7 @@ def pick(body: Body, hand: str, tube: str) -> Iterator[Motion]:
     what = f"tube {tube!r}"
     grasp_centre = foot + settings.pick.grip_height * UP
     rest = arm.posture(settings.postures.pick)
-    over = level_hand(grasp_centre + settings.pick.lift * UP, _approach_yaw(body, hand), settings.pick.centre_beyond_end)
+    over = level_hand(grasp_centre + settings.pick.lift * UP, settings.pick.yaw_of(hand), settings.pick.centre_beyond_end)
     way = _level_way(body, hand, over, settings.speeds.move, what, rest)
     yield Follow(((arm.joints, way), fingers(body, hand, settings.grip.open)))
     yield vertical(body, hand, -settings.pick.lift, settings.speeds.move, what)
@@ -106,7 +101,7 @@ def place(body: Body, hand: str, tube: str, foot: np.ndarray) -> Iterator[Motion
     arm, settings = body.arms[hand], body.settings
     held = body.held_in(hand, tube)
     what = f"the place of tube {tube!r}"
-    yaw = _approach_yaw(body, hand)
+    yaw = settings.pick.yaw_of(hand)
     approach = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     base_from_tube = frame_along(UP, approach, foot + (settings.pick.lift + settings.pick.place_clearance) * UP)
     rest = arm.posture(settings.postures.pick)

@@ -52,6 +52,10 @@ class PickSettings:
     approach_yaw: float
     way_point_spacing: float = field(metadata=_POSITIVE)
 
+    def yaw_of(self, hand: str) -> float:
+        """Return a hand's approach direction about z of base [rad]."""
+        return self.approach_yaw if hand == "left" else -self.approach_yaw
+
 
 @dataclass(frozen=True)
 class PostureSettings:
