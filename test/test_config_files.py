@@ -71,8 +71,8 @@ def test_a_file_holds_plain_finite_values(file):
 
 
 @pytest.mark.parametrize("block, table, key, problem", [
-    ("profiled_pour", "dip_seconds", "2", "profiled_pour.dip_seconds: has the keys 0, 1, 3; expected the keys 0, 1, 2, 3"),
-    ("linear_pour", "return_steps", "3", "linear_pour.return_steps: has the keys 1, 2, 4; expected the keys 1, 2, 3, 4"),
+    ("profiled_pour", "dip_seconds", "2", "profiled_pour.dip_seconds: lacks the key 2; expected the keys 0, 1, 2, 3"),
+    ("linear_pour", "return_steps", "3", "linear_pour.return_steps: lacks the key 3; expected the keys 1, 2, 3, 4"),
 ])
 def test_a_direct_pour_that_lacks_a_turn_is_refused_before_anything_moves(block, table, key, problem):
     content = load_yaml(ROOT / "config" / "control_engine.yaml")

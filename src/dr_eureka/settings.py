@@ -13,7 +13,7 @@ import dataclasses
 import math
 import types
 import typing
-from typing import Any, Mapping, TypeVar
+from typing import Any, Iterable, Mapping, TypeVar
 
 from dr_eureka.errors import DrEurekaError
 
@@ -32,6 +32,16 @@ class SettingsError(DrEurekaError):
         self.key = key
         self.value = value
         self.expected = expected
+
+
+def expect_keys(where: str, key: str, table: Mapping[Any, Any], needed: Iterable, allowed: Iterable = ()) -> None:
+    """Raise SettingsError when a table lacks a needed key or has one that is neither needed nor allowed."""
+    needed = tuple(needed)
+    strange = [name for name in table if name not in (*needed, *allowed)]
+    missing = [name for name in needed if name not in table]
+    if strange or missing:
+        problem = f"has the unknown key {strange[0]!r}" if strange else f"lacks the key {missing[0]!r}"
+        raise SettingsError(where, key, problem, f"the keys {', '.join(map(str, needed))}", table)
 
 
 def build(cls: type[T], mapping: Mapping[str, Any], where: str = "settings") -> T:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Mapping, Sequence
 
 from dr_eureka.control.pour_geometry import LipPlace, PourPlace
 from dr_eureka.control.trajectory import MotionLimits
 from dr_eureka.game.state import TUBE_CAPACITY
 from dr_eureka.kinematics.hybrid import HybridSettings
-from dr_eureka.settings import SettingsError, build
+from dr_eureka.settings import build, expect_keys
 
 _POSITIVE = {"min": 1e-6}
 
@@ -187,16 +186,9 @@ class ControlSettings:
     def from_mapping(cls, mapping: dict, where: str) -> ControlSettings:
         """Validate the yaml's content (its `node:` block is the ROS node's own); raises SettingsError."""
         settings = build(cls, {key: value for key, value in mapping.items() if key != "node"}, where)
-        numbers = range(1, TUBE_CAPACITY + 1)
-        _check_keys(settings.profiled_pour.dip_seconds, range(TUBE_CAPACITY), where, "profiled_pour.dip_seconds")
-        _check_keys(settings.linear_pour.return_steps, numbers, where, "linear_pour.return_steps")
-        for held, steps in settings.linear_pour.return_steps.items():
-            _check_keys(steps, range(1, held + 1), where, f"linear_pour.return_steps.{held}")
+        dips, turns = settings.profiled_pour.dip_seconds, settings.linear_pour.return_steps
+        expect_keys(where, "profiled_pour.dip_seconds", dips, range(TUBE_CAPACITY))
+        expect_keys(where, "linear_pour.return_steps", turns, range(1, TUBE_CAPACITY + 1))
+        for held, steps in turns.items():
+            expect_keys(where, f"linear_pour.return_steps.{held}", steps, range(1, held + 1))
         return settings
-
-
-def _check_keys(table: Mapping[int, object], needed: Sequence[int], where: str, key: str) -> None:
-    """Raise SettingsError unless a table tells of each number of balls that there may be, and of no other."""
-    if set(table) != set(needed):
-        told, numbers = (", ".join(map(str, sorted(keys))) for keys in (table, needed))
-        raise SettingsError(where, key, f"has the keys {told}", f"the keys {numbers}", table)

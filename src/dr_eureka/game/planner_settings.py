@@ -1,7 +1,6 @@
 """What the planner knows of the robot: which hand takes which tube, how long things take, how pours end."""
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import fsum
@@ -11,7 +10,7 @@ from dr_eureka.errors import DrEurekaError
 from dr_eureka.game.hands import HANDS
 from dr_eureka.game.state import TUBE_CAPACITY, TUBES
 from dr_eureka.resources import load_yaml
-from dr_eureka.settings import SettingsError, build
+from dr_eureka.settings import SettingsError, build, expect_keys
 
 PLANNER_FILE = "config/planner.yaml"
 _SHARE = {"min": 0.0, "max": 1.0}
@@ -92,46 +91,36 @@ def load_planner_settings(path: str = PLANNER_FILE) -> PlannerSettings:
 def planner_settings(content: Any, path: str) -> PlannerSettings:
     """Check the content of the yaml at `path`; raises SettingsError naming that and the key."""
     settings = build(PlannerSettings, content, path)
-    _expect_keys(path, "reach", settings.reach, HANDS)
+    expect_keys(path, "reach", settings.reach, HANDS)
     durations = settings.durations
     for key, table in (
         ("durations.pick.from_home", durations.pick.from_home),
         ("durations.pick.after_place", durations.pick.after_place),
         ("durations.place", durations.place),
     ):
-        _expect_keys(path, key, table, HANDS)
+        expect_keys(path, key, table, HANDS)
         for hand, tubes in settings.reach.items():
-            _expect_keys(path, f"{key}.{hand}", table[hand], tubes, TUBES)
+            expect_keys(path, f"{key}.{hand}", table[hand], tubes, TUBES)
     counts = range(1, TUBE_CAPACITY + 1)
     for key, table in (
         ("durations.ready", durations.ready),
         ("durations.upright", durations.upright),
         ("outcomes", settings.outcomes),
     ):
-        _expect_keys(path, key, table, settings.methods)
+        expect_keys(path, key, table, settings.methods)
     for method, by_count in durations.pour.items():
-        _expect_keys(path, f"durations.pour.{method}", by_count, counts)
-        _expect_keys(path, f"durations.ready.{method}", durations.ready[method], TUBES)
+        expect_keys(path, f"durations.pour.{method}", by_count, counts)
+        expect_keys(path, f"durations.ready.{method}", durations.ready[method], TUBES)
         for count, pour in by_count.items():
             if pour.seconds == 0.0:
                 key = f"durations.pour.{method}.{count}.seconds"
                 raise SettingsError(path, key, "is 0", "more, or plans never end", 0.0)
-        _expect_keys(path, f"outcomes.{method}", settings.outcomes[method], counts)
+        expect_keys(path, f"outcomes.{method}", settings.outcomes[method], counts)
         for held, by_poured in settings.outcomes[method].items():
-            _expect_keys(path, f"outcomes.{method}.{held}", by_poured, range(1, held + 1))
+            expect_keys(path, f"outcomes.{method}.{held}", by_poured, range(1, held + 1))
             for poured, outcome in by_poured.items():
                 _check_outcome(path, f"outcomes.{method}.{held}.{poured}", held, poured, outcome)
     return settings
-
-
-def _expect_keys(path: str, key: str, table: dict, needed: Iterable, allowed: Iterable = ()) -> None:
-    """Raise SettingsError when a table lacks a needed key or has one that is neither needed nor allowed."""
-    needed = tuple(needed)
-    strange = [name for name in table if name not in (*needed, *allowed)]
-    missing = [name for name in needed if name not in table]
-    if strange or missing:
-        problem = f"has the unknown key {strange[0]!r}" if strange else f"lacks the key {missing[0]!r}"
-        raise SettingsError(path, key, problem, f"the keys {', '.join(map(str, needed))}", table)
 
 
 def _check_outcome(path: str, key: str, held: int, poured: int, outcome: Outcome) -> None:
