@@ -1,6 +1,7 @@
 import re
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -189,6 +190,20 @@ def test_a_hand_over_a_tube_hides_it(pieces, settings):
     found = locate_tubes(image, CAMERA, scene.base_from_camera, pieces, settings)
     assert (found.result, found.tubes) == (TubeResult.TUBE_HIDDEN, {})
     assert "covers the sheet" in found.reason
+
+
+@pytest.mark.parametrize("colour, count", [((14, 14, 14), 3), ((90, 42, 85), 2)], ids=["black", "purple"])
+def test_what_is_as_dark_as_a_foot_behind_a_tube_but_purple_is_no_foot(pieces, settings, colour, count):
+    scene = Scene(tubes=Scene().tubes[:2], balls=("RR", "GG"))
+    image = draw(scene, pieces, CAMERA)
+    turns = np.linspace(0, 2 * np.pi, 60)
+    disc = np.stack([np.cos(turns), np.sin(turns)], axis=1) * pieces.foot_radius + [-0.035, -0.11]
+    on_sheet = np.column_stack([disc, np.zeros(60), np.ones(60)]) @ scene.base_from_sheet.T
+    outline = CAMERA.project((on_sheet @ np.linalg.inv(scene.base_from_camera).T)[:, :3])
+    cv2.fillPoly(image, [np.rint(outline * 16).astype(int)], colour, cv2.LINE_AA, shift=4)
+    found = locate_tubes(image, CAMERA, scene.base_from_camera, pieces, settings)
+    assert (found.result == TubeResult.OK) == (count == 3)
+    assert count == 3 or found.reason.startswith("2 tube feet seen")
 
 
 @pytest.mark.parametrize("turn", np.radians([0, 100, 180, 300]))

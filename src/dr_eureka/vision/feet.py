@@ -38,6 +38,7 @@ class FootSettings:
     smallest_arc_share: float = field(metadata={"min": 0.05, "max": 1.0})
     smallest_agreement: float = field(metadata={"min": 0.05, "max": 1.0})
     brightest_rim: float = field(metadata={"min": 0.01, "max": 1.0})
+    most_coloured_rim: float = field(metadata={"min": 1.0, "max": 255.0})
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,7 @@ def find_feet(
     wiped: np.ndarray,
     below_camera: np.ndarray,
     camera_pixel: Callable[[np.ndarray], float],
+    chroma: Callable[[np.ndarray], float],
     radius_px: float,
     rim_px: float,
     settings: FootSettings,
@@ -65,6 +67,7 @@ def find_feet(
         wiped: (rows, columns) bool, what was set to 1: a foot beside it ends there only in this picture.
         below_camera: (2,) the point of the sheet's plane right below the camera [px], usually outside of the picture.
         camera_pixel: tells for a place (2,) of the picture how long a pixel of the camera is there [px].
+        chroma: tells how far from grey places (..., 2) of the picture are together [grey levels].
         radius_px: radius of the foot's disc.
         rim_px: width of the disc outside of the taped wall.
 
@@ -79,7 +82,7 @@ def find_feet(
             continue
         # Where the camera sees the paper coarsely, the outline is as jagged as its pixels are long.
         band_px = settings.edge_band * camera_pixel(centre)
-        foot = _fit(brightness, wiped, centre, below_camera, radius_px, rim_px, band_px, settings)
+        foot = _fit(brightness, wiped, centre, below_camera, chroma, radius_px, rim_px, band_px, settings)
         if foot is not None:
             feet.append(foot)
     kept: list[Foot] = []
@@ -111,6 +114,7 @@ def _fit(
     wiped: np.ndarray,
     centre: np.ndarray,
     below_camera: np.ndarray,
+    chroma: Callable[[np.ndarray], float],
     radius_px: float,
     rim_px: float,
     band_px: float,
@@ -144,8 +148,11 @@ def _fit(
         return None
     # Between the edge's blur and the wall, the disc itself must be dark.
     depths = np.linspace(EDGE_REACH_PX, 0.8 * rim_px, 4)
-    rim = sample(brightness, centre + (radius_px - depths[:, None]) * outward[good][:, None], PAPER)
-    if np.median(rim) > settings.brightest_rim:
+    rim = centre + (radius_px - depths[:, None]) * outward[good][:, None]
+    if np.median(sample(brightness, rim, PAPER)) > settings.brightest_rim:
+        return None
+    # The shaded side of a purple ball is as dark as a foot behind another tube.
+    if chroma(rim) > settings.most_coloured_rim:
         return None
     spread = max(0.2, float(np.std(errors[good] - (outward @ shift)[good])))
     # Neighbouring rays share camera pixels: count every second one.

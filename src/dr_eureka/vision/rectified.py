@@ -61,6 +61,13 @@ def rectify(image: np.ndarray, camera: CameraModel, camera_from_sheet: np.ndarra
     return cv2.warpPerspective(image, image_from_grid, grid.size, flags=flags, borderValue=(255, 255, 255))
 
 
+def camera_pixels(camera: CameraModel, camera_from_sheet: np.ndarray, grid: SheetGrid, pixels: np.ndarray) -> np.ndarray:
+    """Return the pixels (..., 2) of the camera that see pixels (..., 2) of `grid`."""
+    image_from_grid = _image_from_grid(camera, camera_from_sheet, grid)
+    seen = np.asarray(pixels) @ image_from_grid[:, :2].T + image_from_grid[:, 2]
+    return seen[..., :2] / seen[..., 2:]
+
+
 def camera_pixel_size(camera: CameraModel, camera_from_sheet: np.ndarray, grid: SheetGrid, pixel: np.ndarray) -> float:
     """Return how long a pixel of the camera is on `grid` at a pixel (2,) of it, along its longer side [px]."""
     image_from_grid = _image_from_grid(camera, camera_from_sheet, grid)

@@ -15,7 +15,7 @@ from dr_eureka.resources import load_yaml
 from dr_eureka.settings import build
 from dr_eureka.vision.camera import CameraModel
 from dr_eureka.vision.feet import Foot, FootSettings, find_feet
-from dr_eureka.vision.rectified import SheetGrid, camera_pixel_size, paper_brightness, rectify, wiped_out
+from dr_eureka.vision.rectified import SheetGrid, camera_pixel_size, camera_pixels, paper_brightness, rectify, wiped_out
 from dr_eureka.vision.sheet import FEWEST_MARKERS, SheetError, SheetPose, SheetSettings, locate_sheet
 from dr_eureka.vision.tube_faults import FaultSettings, litter_on_sheet, other_dictionary
 
@@ -119,7 +119,7 @@ def locate_tubes(
     if brightness is None:
         reason = f"markers have less than {settings.smallest_contrast:g} grey levels of contrast"
         return TubeScene(TubeResult.NO_SHEET, {}, None, sheet.markers, reason)
-    feet = _feet(brightness, camera, sheet, grid, settings)
+    feet = _feet(straight, brightness, camera, sheet, grid, settings)
     places = sorted((_place(foot, sheet, grid, settings) for foot in feet), key=lambda place: -place.position[1])
     if len(feet) < len(NAMES):
         result, reason = _why_missing(straight, value, brightness, camera, sheet, feet, grid, settings)
@@ -149,14 +149,25 @@ def _brightness(
 
 
 def _feet(
-    brightness: np.ndarray, camera: CameraModel, sheet: SheetPose, grid: SheetGrid, settings: TubeSettings
+    straight: np.ndarray,
+    brightness: np.ndarray,
+    camera: CameraModel,
+    sheet: SheetPose,
+    grid: SheetGrid,
+    settings: TubeSettings,
 ) -> list[Foot]:
     below_camera = grid.pixels(np.linalg.inv(sheet.camera_from_sheet)[:2, 3])
     radius_px = grid.pieces.foot_radius * grid.pixels_per_metre
     rim_px = radius_px - grid.pieces.tube_outer_radius * grid.pixels_per_metre
     wiped = wiped_out(grid, settings.marker_margin_m)
     pixel_size = partial(camera_pixel_size, camera, sheet.camera_from_sheet, grid)
-    return find_feet(brightness, wiped, below_camera, pixel_size, radius_px, rim_px, settings.foot)
+
+    def chroma(pixels: np.ndarray) -> float:
+        where = np.rint(camera_pixels(camera, sheet.camera_from_sheet, grid, pixels)).astype(int).reshape(-1, 2)
+        columns, rows = np.clip(where, 0, (camera.width - 1, camera.height - 1)).T
+        return float(np.ptp(np.median(straight[rows, columns], axis=0)))
+
+    return find_feet(brightness, wiped, below_camera, pixel_size, chroma, radius_px, rim_px, settings.foot)
 
 
 def _fault_of(places: list[TubePlace], pieces: Pieces, settings: TubeSettings) -> tuple[str, str]:
@@ -186,7 +197,7 @@ def _why_missing(
     count = f"{len(feet)} tube feet seen on the sheet, expected {len(NAMES)}"
     around = SheetGrid(pieces, settings.pixels_per_metre, faults.margin_m)
     half = np.array([pieces.sheet_depth, pieces.sheet_width]) / 2
-    anywhere = _feet(_brightness(value, camera, sheet, around, settings), camera, sheet, around, settings)
+    anywhere = _feet(straight, _brightness(value, camera, sheet, around, settings), camera, sheet, around, settings)
     outside = sum((np.abs(around.points(foot.centre)) > half).any() for foot in anywhere)
     if outside:
         return TubeResult.TUBE_OFF_SHEET, f"{count}; {outside} beside it"
