@@ -48,10 +48,21 @@ def test_more_balls_to_pour_take_a_later_turn_in_both_forms():
         assert list(steps.values()) == sorted(steps.values())
 
 
-def test_the_profiled_tilt_brakes_the_balls_well_above_level_and_takes_less_than_the_goal():
+@pytest.mark.parametrize("tilt, settings", [(linear_tilt, LINEAR), (profiled_tilt, PROFILED)])
+def test_both_tilts_brake_the_balls_well_above_level(tilt, settings):
+    assert settings.return_elevation > settings.ready_elevation
+    for held, count in POURS:
+        assert tilt(settings, held, count)[1].max() == pytest.approx(settings.return_elevation)
+
+
+def test_the_papers_own_return_ends_at_the_ready_elevation():
+    _, elevations = linear_tilt(replace(LINEAR, return_elevation=LINEAR.ready_elevation), 3, 1)
+    assert elevations.max() == pytest.approx(LINEAR.ready_elevation)
+
+
+def test_the_profiled_tilt_dips_as_deep_as_it_is_told_at_most_and_takes_less_than_the_goal():
     for held, count in POURS[1:]:
         times, elevations = profiled_tilt(PROFILED, held, count)
-        assert elevations.max() == pytest.approx(PROFILED.return_elevation)
         assert PROFILED.dip_elevation - 0.003 <= elevations.min() < 0.0
         assert times[-1] < (0.8 if held > count else 1.0)
 

@@ -18,9 +18,10 @@ Tilt = tuple[np.ndarray, np.ndarray]
 
 
 def linear_tilt(settings: LinearPourSettings, balls_before: int, count: int) -> Tilt:
-    """Return the tilt that goes evenly from the ready to the pouring elevation and, at the step of this pour, straight back.
+    """Return the tilt that goes evenly from the ready to the pouring elevation and, at the step of this pour, back at once.
 
-    Raises ControlError for a pour that has no return step.
+    The paper's comes back to the ready elevation; ours first goes past it, to the return elevation. Raises ControlError for a
+    pour that has no return step.
     """
     step = settings.return_steps.get(balls_before, {}).get(count)
     if step is None:
@@ -30,9 +31,9 @@ def linear_tilt(settings: LinearPourSettings, balls_before: int, count: int) -> 
     turn = step * settings.step_seconds
 
     def command(time: float) -> float:
-        return settings.ready_elevation + (way * min(time / forward, 1.0) if time < turn else 0.0)
+        return settings.ready_elevation + way * min(time / forward, 1.0) if time < turn else settings.return_elevation
 
-    return _followed(command, settings.ready_elevation, settings.limits, turn)
+    return _then_ready(_followed(command, settings.ready_elevation, settings.limits, turn), settings)
 
 
 def profiled_tilt(settings: ProfiledPourSettings, balls_before: int, count: int) -> Tilt:
@@ -48,6 +49,11 @@ def profiled_tilt(settings: ProfiledPourSettings, balls_before: int, count: int)
         lambda time: settings.dip_elevation if time < turn else settings.return_elevation,
         settings.ready_elevation, settings.limits, turn,
     )
+    return _then_ready(there, settings)
+
+
+def _then_ready(there: Tilt, settings: LinearPourSettings | ProfiledPourSettings) -> Tilt:
+    """Let a tilt that has come to the return elevation stay there for a while, then go smoothly to the ready elevation."""
     times = np.arange(0.0, settings.back_seconds, STEP_S) + STEP_S
     share = np.clip(times / settings.back_seconds, 0.0, 1.0)
     smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)

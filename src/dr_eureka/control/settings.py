@@ -100,7 +100,8 @@ class LinearPourSettings:
     """The paper's direct pour: evenly from a ready to a pouring pose, cut at a step and back at once.
 
     `return_steps[n][k]`: the step at which it turns back when k of n balls are to be poured; beyond `poses`, it waits at the
-    pouring pose. Angles in rad, lengths in m, `step_seconds` between two poses.
+    pouring pose. `hold_seconds`: how long it then stays at the return elevation; `back_seconds`: from there to ready. Angles in
+    rad, lengths in m, `step_seconds` between two poses.
     """
 
     lip: LipPlace
@@ -108,10 +109,13 @@ class LinearPourSettings:
     ready_elevation: float
     ready_withdrawn: float
     pouring_elevation: float
+    return_elevation: float
     poses: int = field(metadata={"min": 1, "max": 10000})
     step_seconds: float = field(metadata=_POSITIVE)
     limits: TiltLimits
     return_steps: dict[int, dict[int, int]] = field(metadata={"min": 1})
+    hold_seconds: float = field(metadata=_POSITIVE)
+    back_seconds: float = field(metadata=_POSITIVE)
 
 
 @dataclass(frozen=True)
