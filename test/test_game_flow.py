@@ -18,7 +18,7 @@ from dr_eureka.control.codes import EngineCode, EngineState
 from dr_eureka.game.planner import Planner
 from dr_eureka.game.state import START, TUBES, Pour, State
 
-CARD_GAZE, SHEET_GAZE, WATCH_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87), Gaze(0.0, 0.4)
+CARD_GAZE, SHEET_GAZE, SECOND_GAZE, WATCH_GAZE = Gaze(0.0, 0.5), Gaze(0.0, 0.87), Gaze(0.0, 0.8), Gaze(0.0, 0.4)
 SETTINGS = FlowSettings(
     engine_limit=10.0,
     held_limit=1.0,
@@ -37,6 +37,7 @@ SETTINGS = FlowSettings(
     head_tolerance=0.02,
     card_gaze=CARD_GAZE,
     sheet_gaze=SHEET_GAZE,
+    second_sheet_gaze=SECOND_GAZE,
     watch_gaze=WATCH_GAZE,
 )
 GOAL = State.parse("R|GG|PPR")
@@ -89,11 +90,17 @@ class World:
         return FakeLook(SimpleNamespace(state=State.parse(state)) if state else None, GameCode.NO_CARD)
 
     def tube_look(self):
-        """See what the tubes hold: after pours the next of `results`, or what the pours should have led to."""
+        """See what the tubes hold: after pours the next of `results`, or what the pours should have led to.
+
+        An empty result is never seen, one that begins with ~ only from the second gaze.
+        """
         seen = str(self.present)
         if self.flow.report().phase == Phase.PLAYING:
             seen = self.results.pop(0) if self.results else str(reduce(State.after, self.part_pours(), self.present))
-        if not seen:
+            self.hidden = seen if seen[:1] in ("", "~") else None
+        elif self.flow.report().phase == Phase.CHECKING and self.hidden is not None:
+            seen = self.hidden.lstrip("~")
+        if seen[:1] in ("", "~"):
             return FakeLook(None, GameCode.NO_CONTENTS)
         if seen == "ball gone":
             return FakeLook(BallLost("red seen"), GameCode.NO_CONTENTS)
@@ -424,7 +431,18 @@ def test_tubes_that_cannot_be_read_leave_a_finished_game_unchecked():
     finish(world)
     report = world.flow.report()
     assert (report.phase, report.code) == (Phase.FINISHED, GameCode.UNCHECKED)
-    assert "images within 20 s" in report.message
+    assert "images within 5 s" in report.message
+    assert world.gazes[-4:] == [SHEET_GAZE, SECOND_GAZE] * 2
+
+
+def test_tubes_that_cannot_be_read_from_one_gaze_are_looked_at_from_the_other():
+    world = World(goal=GOAL, results=["~R|GG|PPR"])
+    world.until_playing()
+    finish(world)
+    assert (world.flow.report().phase, world.flow.report().code) == (Phase.FINISHED, GameCode.SOLVED)
+    assert world.gazes[-2:] == [SHEET_GAZE, SECOND_GAZE]
+    told = [report.message for report in world.reports if "looking from elsewhere" in report.message]
+    assert len(told) == 1 and "images within 5 s" in told[0]
 
 
 def test_tubes_that_cannot_be_read_before_the_last_pour_end_the_game():
@@ -669,7 +687,7 @@ def engine_dies(world):
         (camera_frozen_after_the_pours, GameCode.CAMERA_FROZEN, "nothing new from the camera for 2 s"),
         (head_stuck, GameCode.HEAD_NOT_STILL, "after 4 s"),
         (head_stuck_before_the_pours, GameCode.HEAD_NOT_STILL, "head_p=0.4"),
-        (unreadable_tubes, GameCode.NO_CONTENTS, "images within 20 s"),
+        (unreadable_tubes, GameCode.NO_CONTENTS, "images within 5 s"),
         (ball_beside_the_tubes, GameCode.BALL_LOST, "red seen"),
         (no_card, GameCode.NO_CARD, "images within 20 s"),
         (engine_refuses, GameCode.ENGINE_REFUSED, "control_engine: BUSY: fake"),

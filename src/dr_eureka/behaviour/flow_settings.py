@@ -30,4 +30,5 @@ class FlowSettings:
     head_tolerance: float = field(metadata={"min": 0.0, "max": 0.5})
     card_gaze: Gaze
     sheet_gaze: Gaze
+    second_sheet_gaze: Gaze
     watch_gaze: Gaze

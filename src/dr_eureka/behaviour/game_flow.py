@@ -24,6 +24,8 @@ from dr_eureka.game.actions import actions_for
 from dr_eureka.game.planner import Planner
 from dr_eureka.game.state import Pour, State
 
+_LOOKS_FROM_EACH_GAZE = 2
+
 
 class GameFlow:
     """Plays `games` games in a row.
@@ -59,6 +61,8 @@ class GameFlow:
         self._message = ""
         self._now: Optional[Observation] = None
         self._look: Optional[GuidedLook] = None
+        self._gazes_left: list[Gaze] = []
+        self._gaze_limit_s = 0.0
         self._confirmation: Optional[CardConfirmation] = None
         self._game = GameRecord(0, planner.strategy, planner.method, goal=goal)
         self._pours_ahead: tuple[Pour, ...] = ()
@@ -146,11 +150,15 @@ class GameFlow:
         self._begin_look(Phase.LOOKING_FOR_CARD, self._settings.card_gaze, self._looks.card(), self._settings.card_limit)
 
     def _begin_tube_look(self, phase: str, limit_s: float) -> None:
-        self._begin_look(phase, self._settings.sheet_gaze, self._looks.tubes(), limit_s)
+        """Look at the tubes from either gaze in turn: a picture that cannot be read stays the same while nothing moves."""
+        gazes = self._settings.sheet_gaze, self._settings.second_sheet_gaze
+        first, *self._gazes_left = gazes * _LOOKS_FROM_EACH_GAZE if self._robot else gazes[:1]
+        self._gaze_limit_s = limit_s / (len(self._gazes_left) + 1)
+        self._begin_look(phase, first, self._looks.tubes(), self._gaze_limit_s)
 
-    def _begin_look(self, phase: str, gaze: Gaze, look: Look, limit_s: float) -> None:
+    def _begin_look(self, phase: str, gaze: Gaze, look: Look, limit_s: float, message: str = "") -> None:
         self._look = GuidedLook(look, gaze if self._robot else None, limit_s, self._settings, self._now)
-        self._enter(phase)
+        self._enter(phase, message)
         refused = failure_in(self._robot.look_at(gaze, self._settings.head_duration)) if self._robot else None
         if refused:
             self.fail(refused.code, refused.message)
@@ -205,7 +213,13 @@ class GameFlow:
 
     def _found_tubes(self) -> TubesFinding | Failure | None:
         outcome = self._look.step(self._now)
-        return Failure(GameCode.BALL_LOST, outcome.message) if isinstance(outcome, BallLost) else outcome
+        if isinstance(outcome, BallLost):
+            return Failure(GameCode.BALL_LOST, outcome.message)
+        if isinstance(outcome, Failure) and outcome.seen and self._gazes_left:
+            gaze, message = self._gazes_left.pop(0), f"{outcome.message}: looking from elsewhere"
+            self._begin_look(self._phase, gaze, self._looks.tubes(), self._gaze_limit_s, message)
+            return None
+        return outcome
 
     def _plan_from(self, seen: TubesFinding) -> None:
         """Plan from what the tubes hold to the goal, and begin to carry that out."""
