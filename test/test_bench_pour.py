@@ -126,4 +126,4 @@ def test_pours_on_the_rig_share_a_grasp_move_just_the_balls_meant_and_repeat():
     rig.pour(PourKind("profiled", "left", 3, 1, 0))
     assert rig.pour(kind) == first
     # Bullet remembers how hard things pressed on one another a little differently.
-    np.testing.assert_allclose(rig.world.tube_pose("left"), end, atol=2e-3)
+    np.testing.assert_allclose(rig.world.tube_pose("left"), end, atol=1e-3)

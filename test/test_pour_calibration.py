@@ -66,6 +66,7 @@ def test_settings_told_of_turns_have_them_for_every_number_of_balls():
 def test_a_search_that_was_broken_off_goes_on_from_its_notes(tmp_path):
     file, all_pours = tmp_path / "notes.jsonl", 2 * sum(map(len, TURNS.values()))
     TableRig.pours = 0
+    file.touch()
     found = search(TableRig, CONTROL, 2, Notes(file, "a search"))
     assert TableRig.pours == all_pours
     first = TURNS["profiled"][0]

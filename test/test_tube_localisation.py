@@ -192,8 +192,9 @@ def test_a_hand_over_a_tube_hides_it(pieces, settings):
     assert "covers the sheet" in found.reason
 
 
+@pytest.mark.parametrize("light", [(1.0, 1.0, 1.0), (0.35, 0.35, 0.35), (1.0, 0.75, 0.5), (0.6, 0.75, 1.0)])
 @pytest.mark.parametrize("colour, count", [((14, 14, 14), 3), ((90, 42, 85), 2)], ids=["black", "purple"])
-def test_what_is_as_dark_as_a_foot_behind_a_tube_but_purple_is_no_foot(pieces, settings, colour, count):
+def test_what_is_as_dark_as_a_foot_behind_a_tube_but_purple_is_no_foot_in_any_light(pieces, settings, colour, count, light):
     scene = Scene(tubes=Scene().tubes[:2], balls=("RR", "GG"))
     image = draw(scene, pieces, CAMERA)
     turns = np.linspace(0, 2 * np.pi, 60)
@@ -201,7 +202,8 @@ def test_what_is_as_dark_as_a_foot_behind_a_tube_but_purple_is_no_foot(pieces, s
     on_sheet = np.column_stack([disc, np.zeros(60), np.ones(60)]) @ scene.base_from_sheet.T
     outline = CAMERA.project((on_sheet @ np.linalg.inv(scene.base_from_camera).T)[:, :3])
     cv2.fillPoly(image, [np.rint(outline * 16).astype(int)], colour, cv2.LINE_AA, shift=4)
-    found = locate_tubes(image, CAMERA, scene.base_from_camera, pieces, settings)
+    lit = np.rint(image * np.array(light)).astype(np.uint8)
+    found = locate_tubes(lit, CAMERA, scene.base_from_camera, pieces, settings)
     assert (found.result == TubeResult.OK) == (count == 3)
     assert count == 3 or found.reason.startswith("2 tube feet seen")
 

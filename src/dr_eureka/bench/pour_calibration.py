@@ -1,8 +1,9 @@
 """When a direct pour must turn back so that just so many balls pass, found on the robot's own arms in simulation.
 
-Over some grasps, drawn at the stated spread with the tubes in their places, every turn of a grid is tried with a full tube. For each
-number of balls the turn is taken at which, and a little before and after, most grasps poured just so many. Where the first ball that stays behind starts does not depend on how many there were
-above it, so that one search serves pours out of fuller and emptier tubes.
+Over some grasps, drawn at the stated spread with the tubes in their places, every turn of a grid is tried with a full tube. For
+each number of balls the turn is taken at which, and a little before and after, most grasps poured just so many. Where the first
+ball that stays behind starts does not depend on how many there were above it, so that one search serves pours out of fuller and
+emptier tubes.
 """
 from __future__ import annotations
 
@@ -58,7 +59,7 @@ class Notes:
         self._arrived: dict[tuple[str, int, int], int] = {}
         if file is None:
             return
-        if not file.exists():
+        if not file.exists() or file.stat().st_size == 0:
             file.write_text(json.dumps({"search": search}) + "\n", encoding="utf-8")
         for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
             try:

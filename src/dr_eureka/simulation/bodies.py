@@ -37,7 +37,7 @@ def set_up_physics(client: BulletClient, physics: PhysicsSettings, cycle: float)
     client.setGravity(0, 0, -GRAVITY)
     client.setPhysicsEngineParameter(
         fixedTimeStep=cycle / physics.steps_per_cycle, numSubSteps=0, numSolverIterations=physics.solver_iterations,
-        enableConeFriction=1, frictionERP=physics.friction_anchor_erp, deterministicOverlappingPairs=1,
+        enableConeFriction=1, deterministicOverlappingPairs=1,
         restitutionVelocityThreshold=physics.restitution_velocity_threshold,
         contactBreakingThreshold=physics.contact_breaking_threshold)
 

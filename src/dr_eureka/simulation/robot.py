@@ -89,10 +89,8 @@ class SimulatedRobot:
             # The motor's rotor, seen through its gears, is far heavier to turn than the 13 g finger, and without it the
             # solver cannot balance 20 N on so light a link. Principal axis 3 is the finger's axis of rotation.
             across, along, _ = self._client.getDynamicsInfo(self.body, index)[2]
-            # An anchor makes a sticking contact stick: otherwise the solver's remainders let the tube creep in the hand. The
-            # solver often has a pad press at one point alone; the rubber's spinning friction is that of all its length.
+            # An anchor makes a sticking contact stick: otherwise the solver's remainders let the tube creep in the hand.
             self._client.changeDynamics(self.body, index, lateralFriction=physics.pad_friction, frictionAnchor=1,
-                                        spinningFriction=physics.pad_friction * physics.pad_spin_radius,
                                         localInertiaDiagonal=(across, along, self._servos.grip_rotor_inertia))
 
     def _set_self_collision(self) -> None:

@@ -30,8 +30,6 @@ class PhysicsSettings:
     wall_boxes: int = field(metadata={"min": 8, "max": 32})
     piece_friction: float = field(metadata={"min": 0.0, "max": 2.0})
     pad_friction: float = field(metadata={"min": 0.0, "max": 2.0})
-    pad_spin_radius: float = field(metadata={"min": 0.0, "max": 0.05})
-    friction_anchor_erp: float = field(metadata={"min": 0.01, "max": 1.0})
     table_friction: float = field(metadata={"min": 0.0, "max": 2.0})
     piece_restitution: float = field(metadata={"min": 0.0, "max": 1.0})
     table_restitution: float = field(metadata={"min": 0.0, "max": 1.0})

@@ -38,7 +38,7 @@ class FootSettings:
     smallest_arc_share: float = field(metadata={"min": 0.05, "max": 1.0})
     smallest_agreement: float = field(metadata={"min": 0.05, "max": 1.0})
     brightest_rim: float = field(metadata={"min": 0.01, "max": 1.0})
-    most_coloured_rim: float = field(metadata={"min": 1.0, "max": 255.0})
+    most_coloured_rim: float = field(metadata={"min": 0.01, "max": 1.0})
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,8 @@ def find_feet(
         wiped: (rows, columns) bool, what was set to 1: a foot beside it ends there only in this picture.
         below_camera: (2,) the point of the sheet's plane right below the camera [px], usually outside of the picture.
         camera_pixel: tells for a place (2,) of the picture how long a pixel of the camera is there [px].
-        chroma: tells how far from grey places (..., 2) of the picture are together [grey levels].
+        chroma: tells how far from the paper's white places (..., 2) of the picture are in hue: the difference of their
+            brightest and their darkest channel, each as a share of the paper's.
         radius_px: radius of the foot's disc.
         rim_px: width of the disc outside of the taped wall.
 
@@ -151,7 +152,7 @@ def _fit(
     rim = centre + (radius_px - depths[:, None]) * outward[good][:, None]
     if np.median(sample(brightness, rim, PAPER)) > settings.brightest_rim:
         return None
-    # The shaded side of a purple ball is as dark as a foot behind another tube.
+    # The shaded side of a purple ball is as dark as a foot behind another tube, but coloured.
     if chroma(rim) > settings.most_coloured_rim:
         return None
     spread = max(0.2, float(np.std(errors[good] - (outward @ shift)[good])))

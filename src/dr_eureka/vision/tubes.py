@@ -162,11 +162,17 @@ def _feet(
     wiped = wiped_out(grid, settings.marker_margin_m)
     pixel_size = partial(camera_pixel_size, camera, sheet.camera_from_sheet, grid)
 
-    def chroma(pixels: np.ndarray) -> float:
+    def colour(pixels: np.ndarray) -> np.ndarray:
         where = np.rint(camera_pixels(camera, sheet.camera_from_sheet, grid, pixels)).astype(int).reshape(-1, 2)
         columns, rows = np.clip(where, 0, (camera.width - 1, camera.height - 1)).T
-        return float(np.ptp(np.median(straight[rows, columns], axis=0)))
+        return np.median(straight[rows, columns], axis=0)
 
+    def chroma(pixels: np.ndarray) -> float:
+        return float(np.ptp(colour(pixels) / paper))
+
+    # Tubes and markers cover less than half of the sheet.
+    half = np.array([grid.pieces.sheet_depth, grid.pieces.sheet_width]) / 2
+    paper = np.maximum(colour(grid.pixels(half * np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 20)] * 2), axis=-1))), 1.0)
     return find_feet(brightness, wiped, below_camera, pixel_size, chroma, radius_px, rim_px, settings.foot)
 
 
