@@ -72,7 +72,7 @@ def test_a_search_that_was_broken_off_goes_on_from_its_notes(tmp_path):
     first = TURNS["profiled"][0]
     lines = file.read_text().splitlines(keepends=True)
     assert [json.loads(line) for line in lines[:2]] == [
-        {"search": "a search"}, {"pour": "profiled", "grasp": 0, "turn": first, "arrived": 1}
+        {"search": "a search"}, {"pour": "profiled", "grasp": 0, "turn": first, "arrived": 0}
     ]
     file.write_text("".join(lines[:71]))
     assert search(TableRig, CONTROL, 2, Notes(file, "a search")) == found

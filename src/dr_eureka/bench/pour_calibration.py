@@ -25,7 +25,7 @@ from dr_eureka.game.state import TUBE_CAPACITY
 
 # When to turn back: steps for linear, ms for profiled; finely where one ball more passes every few, coarsely where all do.
 TURNS = {
-    "profiled": (*range(80, 170, 2), *range(170, 400, 15)),
+    "profiled": (*range(70, 170, 2), *range(170, 400, 15)),
     "linear": (*range(135, 240, 3), *range(240, 400, 15)),
 }
 NO_TURNS: Mapping[str, Mapping[int, int]] = {method: {} for method in TURNS}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import combinations
@@ -161,19 +162,24 @@ def _feet(
     rim_px = radius_px - grid.pieces.tube_outer_radius * grid.pixels_per_metre
     wiped = wiped_out(grid, settings.marker_margin_m)
     pixel_size = partial(camera_pixel_size, camera, sheet.camera_from_sheet, grid)
+    chroma = _chroma_on(straight, camera, sheet, grid)
+    return find_feet(brightness, wiped, below_camera, pixel_size, chroma, radius_px, rim_px, settings.foot)
 
+
+def _chroma_on(
+    straight: np.ndarray, camera: CameraModel, sheet: SheetPose, grid: SheetGrid
+) -> Callable[[np.ndarray], float]:
+    """Return what tells how coloured places (..., 2) [px] of a grid are together, under the light on the paper."""
     def colour(pixels: np.ndarray) -> np.ndarray:
         where = np.rint(camera_pixels(camera, sheet.camera_from_sheet, grid, pixels)).astype(int).reshape(-1, 2)
         columns, rows = np.clip(where, 0, (camera.width - 1, camera.height - 1)).T
         return np.median(straight[rows, columns], axis=0)
 
-    def chroma(pixels: np.ndarray) -> float:
-        return float(np.ptp(colour(pixels) / paper))
-
-    # Tubes and markers cover less than half of the sheet.
+    # Of places all over the sheet the median is paper: tubes and markers cover less than half of it.
+    shares = np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 20)] * 2), axis=-1)
     half = np.array([grid.pieces.sheet_depth, grid.pieces.sheet_width]) / 2
-    paper = np.maximum(colour(grid.pixels(half * np.stack(np.meshgrid(*[np.linspace(-0.95, 0.95, 20)] * 2), axis=-1))), 1.0)
-    return find_feet(brightness, wiped, below_camera, pixel_size, chroma, radius_px, rim_px, settings.foot)
+    paper = np.maximum(colour(grid.pixels(half * shares)), 1.0)
+    return lambda pixels: float(np.ptp(colour(pixels) / paper))
 
 
 def _fault_of(places: list[TubePlace], pieces: Pieces, settings: TubeSettings) -> tuple[str, str]:
