@@ -79,3 +79,11 @@ def test_a_direct_pour_that_lacks_a_turn_is_refused_before_anything_moves(block,
     del content[block][table][key]
     with pytest.raises(SettingsError, match=f"the engine: {problem}"):
         ControlSettings.from_mapping(content, "the engine")
+
+
+@pytest.mark.parametrize("block, ready", [("linear_pour", "0.2758"), ("profiled_pour", "0.0873")])
+def test_a_direct_pour_that_turns_back_below_its_ready_pose_is_refused(block, ready):
+    content = load_yaml(ROOT / "config" / "control_engine.yaml")
+    content[block]["return_elevation"] = 0.05
+    with pytest.raises(SettingsError, match=f"the engine: {block}.return_elevation: is 0.05; expected ready_elevation, {ready}, or more"):
+        ControlSettings.from_mapping(content, "the engine")

@@ -74,9 +74,10 @@ def test_a_search_that_was_broken_off_goes_on_from_its_notes(tmp_path):
     assert [json.loads(line) for line in lines[:2]] == [
         {"search": "a search"}, {"pour": "profiled", "grasp": 0, "turn": first, "arrived": 0}
     ]
-    file.write_text("".join(lines[:71]))
+    file.write_text("".join(lines[:71]) + lines[71][:20])
     assert search(TableRig, CONTROL, 2, Notes(file, "a search")) == found
     assert TableRig.pours == 2 * all_pours - 70
+    assert sorted(file.read_text().splitlines(keepends=True)) == sorted(lines)
 
 
 def test_tubes_that_never_pour_and_notes_that_are_none_are_named(tmp_path):

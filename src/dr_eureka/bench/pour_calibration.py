@@ -61,7 +61,9 @@ class Notes:
             return
         if not file.exists() or file.stat().st_size == 0:
             file.write_text(json.dumps({"search": search}) + "\n", encoding="utf-8")
-        for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        written = file.read_text(encoding="utf-8", errors="replace")
+        whole, end, torn = written.rpartition("\n")
+        for number, line in enumerate((whole if end else torn).splitlines(), 1):
             try:
                 note = json.loads(line)
                 if number > 1:
@@ -72,6 +74,9 @@ class Notes:
             except (ValueError, TypeError, KeyError) as error:
                 problem = f"{file}:{number}: {error!r}; expected a note of a search, or no file"
                 raise PourCalibrationError(problem) from error
+        # A note that was being written when the search was broken off is tried again.
+        if torn:
+            file.write_text(whole + end if end else written + "\n", encoding="utf-8")
 
     def arrived(self, method: str, grasp: int, turn: int, attempt: Callable[[], Poured]) -> int:
         """Return how many balls passed with that turn, -1 where one was lost or no pour was made, trying it if nobody has."""

@@ -8,7 +8,7 @@ from dr_eureka.control.pour_geometry import LipPlace, PourPlace
 from dr_eureka.control.trajectory import MotionLimits
 from dr_eureka.game.state import TUBE_CAPACITY
 from dr_eureka.kinematics.hybrid import HybridSettings
-from dr_eureka.settings import build, expect_keys
+from dr_eureka.settings import SettingsError, build, expect_keys
 
 _POSITIVE = {"min": 1e-6}
 
@@ -195,4 +195,8 @@ class ControlSettings:
         expect_keys(where, "linear_pour.return_steps", turns, range(1, TUBE_CAPACITY + 1))
         for held, steps in turns.items():
             expect_keys(where, f"linear_pour.return_steps.{held}", steps, range(1, held + 1))
+        for name, pour in {"linear_pour": settings.linear_pour, "profiled_pour": settings.profiled_pour}.items():
+            if pour.return_elevation < pour.ready_elevation:
+                problem, expected = f"is {pour.return_elevation:g}", f"ready_elevation, {pour.ready_elevation:g}, or more"
+                raise SettingsError(where, f"{name}.return_elevation", problem, expected, pour.return_elevation)
         return settings

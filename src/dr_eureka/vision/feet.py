@@ -55,7 +55,7 @@ def find_feet(
     wiped: np.ndarray,
     below_camera: np.ndarray,
     camera_pixel: Callable[[np.ndarray], float],
-    chroma: Callable[[np.ndarray], float],
+    tint: Callable[[np.ndarray], float],
     radius_px: float,
     rim_px: float,
     settings: FootSettings,
@@ -67,7 +67,7 @@ def find_feet(
         wiped: (rows, columns) bool, what was set to 1: a foot beside it ends there only in this picture.
         below_camera: (2,) the point of the sheet's plane right below the camera [px], usually outside of the picture.
         camera_pixel: tells for a place (2,) of the picture how long a pixel of the camera is there [px].
-        chroma: tells how far from the paper's white places (..., 2) of the picture are in hue: the difference of their
+        tint: tells how far from the paper's white places (..., 2) of the picture are in hue: the difference of their
             brightest and their darkest channel, each as a share of the paper's.
         radius_px: radius of the foot's disc.
         rim_px: width of the disc outside of the taped wall.
@@ -83,7 +83,7 @@ def find_feet(
             continue
         # Where the camera sees the paper coarsely, the outline is as jagged as its pixels are long.
         band_px = settings.edge_band * camera_pixel(centre)
-        foot = _fit(brightness, wiped, centre, below_camera, chroma, radius_px, rim_px, band_px, settings)
+        foot = _fit(brightness, wiped, centre, below_camera, tint, radius_px, rim_px, band_px, settings)
         if foot is not None:
             feet.append(foot)
     kept: list[Foot] = []
@@ -115,7 +115,7 @@ def _fit(
     wiped: np.ndarray,
     centre: np.ndarray,
     below_camera: np.ndarray,
-    chroma: Callable[[np.ndarray], float],
+    tint: Callable[[np.ndarray], float],
     radius_px: float,
     rim_px: float,
     band_px: float,
@@ -153,7 +153,7 @@ def _fit(
     if np.median(sample(brightness, rim, PAPER)) > settings.brightest_rim:
         return None
     # The shaded side of a purple ball is as dark as a foot behind another tube, but coloured.
-    if chroma(rim) > settings.most_coloured_rim:
+    if tint(rim) > settings.most_coloured_rim:
         return None
     spread = max(0.2, float(np.std(errors[good] - (outward @ shift)[good])))
     # Neighbouring rays share camera pixels: count every second one.

@@ -162,11 +162,11 @@ def _feet(
     rim_px = radius_px - grid.pieces.tube_outer_radius * grid.pixels_per_metre
     wiped = wiped_out(grid, settings.marker_margin_m)
     pixel_size = partial(camera_pixel_size, camera, sheet.camera_from_sheet, grid)
-    chroma = _chroma_on(straight, camera, sheet, grid)
-    return find_feet(brightness, wiped, below_camera, pixel_size, chroma, radius_px, rim_px, settings.foot)
+    tint = _tint_on(straight, camera, sheet, grid)
+    return find_feet(brightness, wiped, below_camera, pixel_size, tint, radius_px, rim_px, settings.foot)
 
 
-def _chroma_on(
+def _tint_on(
     straight: np.ndarray, camera: CameraModel, sheet: SheetPose, grid: SheetGrid
 ) -> Callable[[np.ndarray], float]:
     """Return what tells how coloured places (..., 2) [px] of a grid are together, under the light on the paper."""
