@@ -11,10 +11,10 @@ from dr_eureka.game.state import Pour
 PICKS = [Action("pick", "left", "left"), Action("pick", "right", "right")]
 
 
-def play(actions, places=PLACES, at_once=True):
+def play(actions, places=PLACES, at_once=True, method="lock"):
     engine = make_engine()
     robot = IdealRobot(engine)
-    engine.start(actions, places, BALLS, hands_at_once=at_once)
+    engine.start(actions, places, BALLS, method, hands_at_once=at_once)
     robot.run()
     return engine, robot
 
@@ -61,6 +61,14 @@ def test_where_both_hands_would_be_in_one_anothers_way_one_goes_after_the_other(
     left, right = (moving_cycles(robot, hand)[start:end] for hand in ("left", "right"))
     # Where they take turns, a hand may still be slowing down in the cycle in which the other sets off.
     assert ((left & right).sum() > 100) if at_once else ((left & right).sum() <= 2)
+
+
+@pytest.mark.parametrize("source, target", [("left", "center"), ("center", "left")])
+@pytest.mark.parametrize("left, center", [((0.428, 0.103), (0.448, 0.002)), ((0.450, 0.104), (0.443, 0.008))])
+def test_tubes_that_would_meet_on_the_way_to_a_pour_go_there_one_after_the_other(source, target, left, center):
+    places = PLACES | {"left": (*left, 0.775), "center": (*center, 0.775)}
+    engine, _ = play(actions_for([Pour(source, target, 1)]), places, method="profiled")
+    assert engine.status.state == EngineState.DONE, engine.status
 
 
 def test_tubes_too_near_for_two_hands_are_refused_with_the_names_of_what_would_touch():

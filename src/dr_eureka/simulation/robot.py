@@ -18,6 +18,9 @@ URDF = "config/robot/thormang3.urdf"
 # One motor drives both fingers, so the gear between them yields to nothing a hand meets.
 GEAR_FORCE = 1000.0
 GEAR_ERP = 0.9
+PRESSING = 0.005  # [rad] a finger whose set-point is farther inward than this closes, or presses
+# What PyBullet gives each moving link, and given again makes it look for all of the link's contacts anew.
+DEFAULT_GROUP, ALL_GROUPS = 1, -1
 # Which links may touch which of the robot's own; neighbours and what cannot meet are left out for speed.
 _FOREARM = ("el_y", "wr_r", "wr_y", "wr_p", "grip", "grip_1")
 _TRUNK = ("pelvis_link", "chest_link", "head_p_link")
@@ -58,6 +61,7 @@ class SimulatedRobot:
         self._gains = [servos.grip_position_gain if grip else servos.position_gain for grip in self._is_grip]
         self._velocity_gains = [1.0] * len(self._names)
         self._speed = np.where(self._is_grip, min(servos.grip_speed_limit, servos.speed_limit), servos.speed_limit)
+        self._pressing = np.zeros(len(self._names), dtype=bool)
         self._leg_goals = dict.fromkeys(LEG_JOINTS, 0.0)
         self._set_materials(physics)
         self._set_self_collision()
@@ -143,6 +147,17 @@ class SimulatedRobot:
         present = self._angles()
         lead = self._servos.grip_lead
         self._setpoints = np.where(self._is_grip, np.clip(wanted, present - lead, present + lead), wanted)
+        self._let_go(self._is_grip & (wanted > present + PRESSING))
+
+    def _let_go(self, pressing: np.ndarray) -> None:
+        """Forget the contacts of fingers that no longer press, by joint (n,) bool; the solver finds again those that are there.
+
+        Bullet keeps an anchored contact's normal as it was in `base` when the pad first touched, however the hand has turned
+        since. One that has come to point upward would carry the tube away on an opening finger.
+        """
+        for joint in np.flatnonzero(self._pressing & ~pressing):
+            self._client.setCollisionFilterGroupMask(self.body, self._indices[joint], DEFAULT_GROUP, ALL_GROUPS)
+        self._pressing = pressing
 
     def drive(self, share: float) -> None:
         """Command the servos to the set-point reached at `share` (0..1) of this cycle."""
