@@ -151,6 +151,27 @@ def test_a_hand_lifts_turns_and_holds_a_full_tube_by_friction_alone(tube_in_hand
     assert verdict.tubes["left"] == "RRGG" and not verdict.tubes_standing["left"]
 
 
+def pad_normals(world, finger):
+    """Return the normals (k, 3) of a left finger's contacts with the left tube, in the finger's frame."""
+    robot = world._robot
+    contacts = world._client.getContactPoints(robot.body, world._tubes["left"], robot.link_index[f"l_arm_{finger}_link"])
+    return np.array([contact[7] for contact in contacts]).reshape(-1, 3) @ world.link_pose(f"l_arm_{finger}_link")[:3, :3]
+
+
+def test_a_hand_that_opens_after_it_turned_forgets_how_its_pads_lay_before(tube_in_hand):
+    world, pads = tube_in_hand, ("grip", "grip_1")
+    # Both pads face the tube squarely; the solver holds on to normals of the time when they closed.
+    square = {pad: np.array([-0.26, side, 0.0]) for pad, side in zip(pads, (0.966, -0.966))}
+    held = np.concatenate([pad_normals(world, pad) @ square[pad] for pad in pads])
+    assert held.min() < 0.9
+    closed = world.joint_positions()["l_arm_grip"]
+    world.set_joint_goals({"l_arm_grip": 0.5})
+    while world.joint_positions()["l_arm_grip"] > closed - 0.0005:
+        world.advance_cycle()
+    opening = np.concatenate([pad_normals(world, pad) @ square[pad] for pad in pads])
+    assert len(opening) > 0 and opening.min() > 0.99
+
+
 def test_both_fingers_close_together_and_an_empty_hand_closes_further(world):
     world.set_joint_goals({"r_arm_grip": 1.15})
     run(world, 1.0)
