@@ -399,6 +399,16 @@ def test_a_gap_in_the_joint_states_delays_a_motion_and_never_makes_it_jump():
     assert robot.run() == EngineState.DONE and robot.joints["head_p"] == pytest.approx(0.8)
 
 
+def test_before_the_first_joint_state_nothing_is_moved_and_the_engine_is_not_ready():
+    engine = make_engine()
+    assert (engine.status.state, engine.status.code) == (EngineState.IDLE, EngineCode.NO_JOINT_STATES)
+    with pytest.raises(ControlError, match="no joint state has been received") as refused:
+        engine.move_joints({"head_p": 0.5}, 1.0)
+    assert refused.value.code == EngineCode.NO_JOINT_STATES
+    IdealRobot(engine).cycle()
+    assert (engine.status.code, engine.status.message) == (EngineCode.OK, "ready")
+
+
 def test_after_lost_joint_states_the_robot_holds_where_it_is_found():
     engine = make_engine()
     robot = IdealRobot(engine)

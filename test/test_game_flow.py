@@ -621,6 +621,10 @@ def no_engine(world):
     world.now = replace(world.now, engine=None)
 
 
+def engine_without_a_robot(world):
+    world.engine(EngineState.IDLE, EngineCode.NO_JOINT_STATES)
+
+
 def no_image_ever(world):
     world.now = replace(world.now, camera_seen=False, camera_problem="no image on camera/image_raw")
     world.frames = False
@@ -681,6 +685,7 @@ def engine_dies(world):
     "fault, code, words",
     [
         (no_engine, GameCode.NO_ENGINE, "no status of control_engine within 10 s"),
+        (engine_without_a_robot, GameCode.NO_ENGINE, "no present joint states within 10 s"),
         (no_image_ever, GameCode.NO_CAMERA, "no image on camera/image_raw within 5 s"),
         (no_image_while_looking, GameCode.NO_CAMERA, "no image within 5 s"),
         (camera_frozen, GameCode.CAMERA_FROZEN, "nothing new from the camera for 2 s: image of 7.300 s repeats the one before"),

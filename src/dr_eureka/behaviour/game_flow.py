@@ -130,7 +130,8 @@ class GameFlow:
 
     def _wait_for_engine(self) -> None:
         engine = self._now.engine
-        if engine and engine.state != EngineState.BUSY and self._now.head and not self._engine_is_silent():
+        heard_robot = engine and engine.code != EngineCode.NO_JOINT_STATES and self._now.head
+        if heard_robot and engine.state != EngineState.BUSY and not self._engine_is_silent():
             self._enter(Phase.WAITING_FOR_CAMERA)
         elif self._waited_s() > self._settings.engine_limit:
             missing = "present joint states" if engine else "status of control_engine"

@@ -75,7 +75,7 @@ class ControlEngine:
         self._motion_start = 0.0
         self._last_tick: float | None = None
         self._lagging_since: dict[str, float] = {}
-        self.status = EngineStatus(EngineState.IDLE, EngineCode.OK, -1, "ready")
+        self.status = EngineStatus(EngineState.IDLE, EngineCode.NO_JOINT_STATES, -1, "no joint state has been received yet")
         self.durations: list[tuple[int, float, float]] = []
         """(action index, start, end) [s] of every finished action of the strategy."""
 
@@ -141,7 +141,7 @@ class ControlEngine:
                 raise ControlError(EngineCode.OUT_OF_LIMITS, f"{name} to {goal:.3f} rad, expected {low:.3f} to {high:.3f}")
         self._refuse_when_busy()
         if not self.body.goals:
-            raise ControlError(EngineCode.JOINT_STATES_LOST, "no joint state has been received yet")
+            raise ControlError(EngineCode.NO_JOINT_STATES, "no joint state has been received, or none since they were lost")
         self._begin(Script(f"moving {', '.join(goals)}", self._joint_move(dict(goals), duration)))
 
     def go_on(self, put_down: bool) -> None:
@@ -179,6 +179,8 @@ class ControlEngine:
             joints = self.body.joints
             self.body.goals = {name: float(joints[name]) for name in CONTROLLED_JOINTS}
             self._limiter.reset(time_s, self.body.goals)
+            if self.status.code == EngineCode.NO_JOINT_STATES:
+                self.status = replace(self.status, code=EngineCode.OK, message="ready")
         try:
             self._skip_gap(time_s)
             self._check_tracking(time_s)
