@@ -63,12 +63,16 @@ def test_where_both_hands_would_be_in_one_anothers_way_one_goes_after_the_other(
     assert ((left & right).sum() > 100) if at_once else ((left & right).sum() <= 2)
 
 
-@pytest.mark.parametrize("source, target", [("left", "center"), ("center", "left")])
-@pytest.mark.parametrize("left, center", [((0.428, 0.103), (0.448, 0.002)), ((0.450, 0.104), (0.443, 0.008))])
-def test_tubes_that_would_meet_on_the_way_to_a_pour_go_there_one_after_the_other(source, target, left, center):
+@pytest.mark.parametrize("left, center, in_turn", [
+    ((0.428, 0.103), (0.448, 0.002), True), ((0.450, 0.104), (0.443, 0.008), True), ((0.44, 0.11), (0.44, 0.0), False),
+])
+def test_tubes_that_would_meet_on_the_way_to_a_pour_go_there_one_after_the_other(left, center, in_turn):
     places = PLACES | {"left": (*left, 0.775), "center": (*center, 0.775)}
-    engine, _ = play(actions_for([Pour(source, target, 1)]), places, method="profiled")
+    engine, robot = play(actions_for([Pour("left", "center", 1)]), places, method="profiled")
     assert engine.status.state == EngineState.DONE, engine.status
+    start, end = (int(time / CYCLE) for time in next(times for index, *times in engine.durations if index == 2))
+    both = np.sum(moving_cycles(robot, "left")[start:end] & moving_cycles(robot, "right")[start:end])
+    assert both <= 2 if in_turn else both > 50
 
 
 def test_tubes_too_near_for_two_hands_are_refused_with_the_names_of_what_would_touch():

@@ -8,6 +8,7 @@ emptier tubes.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -50,8 +51,9 @@ class Turn:
 class Notes:
     """What was tried and how many balls passed, in a file of one JSON object a line, so that a search can go on later.
 
-    `search`: a word for what is searched with; the first line tells it. Raises PourCalibrationError for a file that holds
-    something else, or notes of another search.
+    `search`: a word for what is searched with; the first line tells it. A last line without its end was being written when a
+    search was broken off: it is cut off. Raises PourCalibrationError for a file that holds something else, or notes of another
+    search.
     """
 
     def __init__(self, file: Path | None, search: str):
@@ -61,9 +63,8 @@ class Notes:
             return
         if not file.exists() or file.stat().st_size == 0:
             file.write_text(json.dumps({"search": search}) + "\n", encoding="utf-8")
-        written = file.read_text(encoding="utf-8", errors="replace")
-        whole, end, torn = written.rpartition("\n")
-        for number, line in enumerate((whole if end else torn).splitlines(), 1):
+        whole, _, torn = file.read_bytes().rpartition(b"\n")
+        for number, line in enumerate(whole.splitlines() or [b""], 1):
             try:
                 note = json.loads(line)
                 if number > 1:
@@ -74,9 +75,8 @@ class Notes:
             except (ValueError, TypeError, KeyError) as error:
                 problem = f"{file}:{number}: {error!r}; expected a note of a search, or no file"
                 raise PourCalibrationError(problem) from error
-        # A note that was being written when the search was broken off is tried again.
         if torn:
-            file.write_text(whole + end if end else written + "\n", encoding="utf-8")
+            os.truncate(file, len(whole) + 1)
 
     def arrived(self, method: str, grasp: int, turn: int, attempt: Callable[[], Poured]) -> int:
         """Return how many balls passed with that turn, -1 where one was lost or no pour was made, trying it if nobody has."""

@@ -29,14 +29,15 @@ def raise_tubes(body: Body) -> Iterator[Motion]:
         yield _along(body, planner, points)
     moves = [(body.arms[hand], body.commanded(hand), body.upright[hand]) for hand in HANDS if hand in body.held]
     if moves:
-        yield _clear_of_each_other(body, moves)
+        yield _together_or_in_turn(body, moves)
     body.pour_ready, body.upright = None, {}
 
 
-def _clear_of_each_other(body: Body, moves: Sequence[_Move]) -> Follow:
+def _together_or_in_turn(body: Body, moves: Sequence[_Move]) -> Follow:
     """Return joint-space moves of several arms: all together or, where that ends in a collision, one after the other."""
     together = _together(body, moves)
     ways = chain([together], (_in_turn(body, order) for order in permutations(moves)))
+    # Where no way is free, the engine refuses this one and names what would touch.
     return next((way for way in ways if body.hit(way) is None), together)
 
 
@@ -94,6 +95,6 @@ def _get_ready(body: Body, planner: PourPlanner) -> Iterator[Motion]:
     source, target = planner.source, planner.target
     body.upright = {arm.hand: body.commanded(arm.hand) for arm in (source, target)}
     ends = ((source, planner.docking[0]), (target, planner.receiving))
-    yield _clear_of_each_other(body, [(arm, body.commanded(arm.hand), end) for arm, end in ends])
+    yield _together_or_in_turn(body, [(arm, body.commanded(arm.hand), end) for arm, end in ends])
     _check_grips(body, source.hand, target.hand, "before the tubes come together")
     yield _along(body, planner, planner.docking)

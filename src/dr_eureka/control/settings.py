@@ -195,6 +195,7 @@ class ControlSettings:
         expect_keys(where, "linear_pour.return_steps", turns, range(1, TUBE_CAPACITY + 1))
         for held, steps in turns.items():
             expect_keys(where, f"linear_pour.return_steps.{held}", steps, range(1, held + 1))
+        # From the return elevation a tube comes down to ready: nothing that stays may roll out meanwhile.
         for name, pour in {"linear_pour": settings.linear_pour, "profiled_pour": settings.profiled_pour}.items():
             if pour.return_elevation < pour.ready_elevation:
                 problem, expected = f"is {pour.return_elevation:g}", f"ready_elevation, {pour.ready_elevation:g}, or more"

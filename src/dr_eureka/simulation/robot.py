@@ -18,7 +18,7 @@ URDF = "config/robot/thormang3.urdf"
 # One motor drives both fingers, so the gear between them yields to nothing a hand meets.
 GEAR_FORCE = 1000.0
 GEAR_ERP = 0.9
-PRESSING = 0.005  # [rad] a finger whose set-point is farther inward than this closes, or presses
+PRESSING_LEAD = 0.005  # [rad] a finger whose set-point is farther inward than this closes, or presses
 # What PyBullet gives each moving link, and given again makes it look for all of the link's contacts anew.
 DEFAULT_GROUP, ALL_GROUPS = 1, -1
 # Which links may touch which of the robot's own; neighbours and what cannot meet are left out for speed.
@@ -147,7 +147,7 @@ class SimulatedRobot:
         present = self._angles()
         lead = self._servos.grip_lead
         self._setpoints = np.where(self._is_grip, np.clip(wanted, present - lead, present + lead), wanted)
-        self._let_go(self._is_grip & (wanted > present + PRESSING))
+        self._let_go(self._is_grip & (wanted > present + PRESSING_LEAD))
 
     def _let_go(self, pressing: np.ndarray) -> None:
         """Forget the contacts of fingers that no longer press, by joint (n,) bool; the solver finds again those that are there.
@@ -166,13 +166,13 @@ class SimulatedRobot:
             self.body, self._indices, pybullet.POSITION_CONTROL, targetPositions=targets.tolist(), forces=self._forces,
             positionGains=self._gains, velocityGains=self._velocity_gains)
 
-    def servo_state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return goals, set-points and the set-points of the cycle before (n,) [rad], for `set_servo_state`."""
-        return self._goals.copy(), self._setpoints.copy(), self._previous.copy()
+    def servo_state(self) -> tuple[np.ndarray, ...]:
+        """Return goals, set-points and those of the cycle before (n,) [rad], and which fingers press, for `set_servo_state`."""
+        return self._goals.copy(), self._setpoints.copy(), self._previous.copy(), self._pressing.copy()
 
-    def set_servo_state(self, state: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    def set_servo_state(self, state: tuple[np.ndarray, ...]) -> None:
         """Let the servos go on from a state as `servo_state` returned it."""
-        self._goals, self._setpoints, self._previous = (values.copy() for values in state)
+        self._goals, self._setpoints, self._previous, self._pressing = (values.copy() for values in state)
 
     def _angles(self) -> np.ndarray:
         return np.array([state[0] for state in self._client.getJointStates(self.body, self._indices)]) - self._offsets

@@ -34,7 +34,7 @@ class Snapshot:
     """A moment of one world: Bullet's number for it, the servos' goals, the control cycles until then."""
 
     bullet_state: int
-    servos: tuple[np.ndarray, np.ndarray, np.ndarray]
+    servos: tuple[np.ndarray, ...]
     cycles: int
 
 
@@ -198,7 +198,10 @@ class World:
         return Snapshot(self._client.saveState(), self._robot.servo_state(), self._cycles)
 
     def go_back(self, snapshot: Snapshot) -> None:
-        """Let everything be as it was when it was remembered, time included; for trials that share a beginning."""
+        """Let everything be as it was when it was remembered, time included; for trials that share a beginning.
+
+        A hand that held a tube then, and has opened since, holds it again by contacts that are found anew: up to 4 mm otherwise.
+        """
         self._client.restoreState(snapshot.bullet_state)
         self._robot.set_servo_state(snapshot.servos)
         self._cycles = snapshot.cycles
