@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import chain, permutations
+from itertools import chain
 from typing import Iterator, Sequence
 
 import numpy as np
 
 from dr_eureka.control.arm import Arm
+from dr_eureka.control.at_once import at_once
 from dr_eureka.control.body import Body
 from dr_eureka.control.codes import ControlError, EngineCode
 from dr_eureka.control.motion import Follow, Motion
 from dr_eureka.control.pour_planner import PourPlanner
-from dr_eureka.control.trajectory import JointTrajectory, TrajectorySequence
+from dr_eureka.control.trajectory import JointTrajectory
 from dr_eureka.game.hands import HANDS
 
 _Move = tuple[Arm, np.ndarray, np.ndarray]
@@ -29,34 +30,16 @@ def raise_tubes(body: Body) -> Iterator[Motion]:
         yield _along(body, planner, points)
     moves = [(body.arms[hand], body.commanded(hand), body.upright[hand]) for hand in HANDS if hand in body.held]
     if moves:
-        yield _together_or_in_turn(body, moves)
+        yield from _carry(body, moves)
     body.pour_ready, body.upright = None, {}
 
 
-def _together_or_in_turn(body: Body, moves: Sequence[_Move]) -> Follow:
-    """Return joint-space moves of several arms: all together or, where that ends in a collision, one after the other."""
-    together = _together(body, moves)
-    ways = chain([together], (_in_turn(body, order) for order in permutations(moves)))
-    # Where no way is free, the engine refuses this one and names what would touch.
-    return next((way for way in ways if body.hit(way) is None), together)
-
-
-def _in_turn(body: Body, moves: Sequence[_Move]) -> Follow:
-    """Return joint-space moves of several arms, each of which waits until the one before is there."""
-    tracks, waited = [], 0.0
-    for arm, start, end in moves:
-        move = arm.move(start, end, body.settings.speeds.carry)
-        wait = [JointTrajectory.lasting(np.vstack([start, start]), waited)] if waited else []
-        tracks.append((arm.joints, TrajectorySequence([*wait, move])))
-        waited += move.duration
-    return Follow(tuple(tracks))
-
-
-def _together(body: Body, moves: Sequence[_Move]) -> Follow:
-    """Return joint-space moves of several arms that start and end together."""
+def _carry(body: Body, moves: Sequence[_Move]) -> Iterator[Motion]:
+    """Move arms in joint space, all in the same time and together or, where they would collide, one after the other."""
     limits = body.settings.speeds.carry
     longest = max(arm.move(start, end, limits).duration for arm, start, end in moves)
-    return Follow(tuple((arm.joints, arm.move(start, end, limits, longest)) for arm, start, end in moves))
+    ways = [iter([Follow(((arm.joints, arm.move(start, end, limits, longest)),))]) for arm, start, end in moves]
+    return at_once(body, *ways) if len(ways) == len(HANDS) else chain(*ways)
 
 
 def _along(body: Body, planner: PourPlanner, points: np.ndarray) -> Follow:
@@ -95,6 +78,6 @@ def _get_ready(body: Body, planner: PourPlanner) -> Iterator[Motion]:
     source, target = planner.source, planner.target
     body.upright = {arm.hand: body.commanded(arm.hand) for arm in (source, target)}
     ends = ((source, planner.docking[0]), (target, planner.receiving))
-    yield _together_or_in_turn(body, [(arm, body.commanded(arm.hand), end) for arm, end in ends])
+    yield from _carry(body, [(arm, body.commanded(arm.hand), end) for arm, end in ends])
     _check_grips(body, source.hand, target.hand, "before the tubes come together")
     yield _along(body, planner, planner.docking)
